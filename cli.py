@@ -1,0 +1,5 @@
+"""`python cli.py ...` is `verlet-numba ...`."""
+
+from verlet_numba.cli import main
+
+main()

@@ -1,0 +1,78 @@
+"""The one place that names Numba's flags, and where its machine code is kept.
+
+Strict arithmetic: no fast-math flag at all. A fused multiply-add or a reassociated sum may come out differently in a
+vectorised loop body, in its scalar remainder and on another processor. Without them a body gives the same bits alone,
+as one lane among a thousand, and on every machine; it costs nothing where division and square root are the bound.
+
+Numba's disk cache checks the file of the cached function only: an edited callee in another file would be served stale.
+So the cache folder is named after everything that the machine code depends on: all sources of this package, Numba,
+NumPy and the processor. An edit anywhere gives a new folder.
+"""
+
+import hashlib
+import os
+import platform
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
+FOLDERS_KEPT = 4
+
+
+def fingerprint(package: Path = Path(__file__).parent) -> str:
+    """Hash of everything that compiled kernels depend on: sources, Numba, NumPy and the processor."""
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(f"{source.relative_to(package)}\0".encode())
+        digest.update(source.read_bytes())
+    environment = (numba.__version__, np.__version__, platform.python_version(), llvm.get_host_cpu_name(),
+                   llvm.get_host_cpu_features().flatten(), os.environ.get("NUMBA_CPU_NAME", ""))
+    digest.update(repr(environment).encode())
+    return digest.hexdigest()[:20]
+
+
+def cache_root() -> Path:
+    """Where the folders of machine code stand: NUMBA_CACHE_DIR, else the user's cache folder."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "verlet-numba"
+
+
+def _prune(root: Path, current: Path) -> None:
+    """Machine code of earlier versions goes: all but the newest few folders of fingerprints."""
+    try:
+        old = [entry for entry in root.iterdir() if len(entry.name) == 20 and entry != current and entry.is_dir()]
+        for entry in sorted(old, key=lambda entry: entry.stat().st_mtime, reverse=True)[FOLDERS_KEPT - 1:]:
+            shutil.rmtree(entry, ignore_errors=True)
+    except OSError:
+        return  # a folder that another process removes at the same time, or that is not ours to clean
+
+
+CACHE = cache_root() / fingerprint()
+if not CACHE.exists():
+    _prune(CACHE.parent, CACHE)
+
+
+def kernel(function: Function) -> Function:
+    """Compile `function` on first call: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE)
+    try:
+        return numba.njit(cache=True, **FLAGS)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def formula(function: Function) -> Function:
+    """Compile a scalar formula that kernels inline; it needs no disk cache of its own."""
+    return numba.njit(**FLAGS)(function)  # type: ignore[no-any-return]

@@ -1,0 +1,217 @@
+"""Every structure-of-arrays buffer that kernels work on, and the one gate that makes them.
+
+Particles of the inner numbering: bodies of equal topology form a group of K copies, numbered copy-minor in blocks of
+B copies, so that particle p of copy k has the index first + (k // B) P B + p B + k % B. The same particle of
+neighbouring copies lies side by side: bodies are vector lanes. Blocks are padded with ghosts, particles of inverse
+mass 0 that no constraint moves.
+
+The comment behind a field gives its shape, kind and unit; a test holds it true for built scenes. n particles of the
+inner numbering, N particles of the file; real: the precision of the run; a field that may be None belongs to what a
+scene may not call for.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Kinds = {"real": None, "double": np.float64, "int": np.int64, "bool": np.bool_}
+
+
+class Particles(NamedTuple):
+    """What a particle is (paper, 3.1): where it is, where it was a substep ago, what accelerates it."""
+
+    position: Array             # (3, n) real m
+    previous: Array             # (3, n) real m; one substep ago
+    inverse_mass: Array         # (n,) real 1/kg; 0: pinned, fixed or a ghost
+    acceleration: Array | None  # (3, n) real m/s^2; None where no effect accelerates
+
+
+class Runs(NamedTuple):
+    """Runs of independent distance constraints: number m of run r joins particles first[0, r] + m and first[1, r] + m."""
+
+    first: Array                # (2, R) int 1
+    count: Array                # (R,) int 1
+    data: Array                 # (R,) int 1; where the run's constraints stand in the arrays below
+    rest: Array                 # (C,) real m
+    weight: Array               # (2, C) real 1; w_i / (w_i + w_j + compliance / h^2); both 0 masks a lane out
+    active: int                 # int 1; constraints that are not masked out
+
+
+class Sticks(NamedTuple):
+    """Distance constraints of bodies without copies or structure, one after another; attachments have rest length 0."""
+
+    ends: Array                 # (2, C) int 1
+    rest: Array                 # (C,) real m
+    weight: Array               # (2, C) real 1; as in Runs
+
+
+class Angles(NamedTuple):
+    """Angles kept: between the sticks from the middle particle to the two others."""
+
+    corners: Array              # (3, A) int 1; end, middle, end
+    rest: Array                 # (A,) double rad
+
+
+class Softness(NamedTuple):
+    """Compliant sticks relaxed in several passes: the correction so far is kept over the passes of a substep."""
+
+    share: Array                # (C,) real 1; (compliance / h^2) / (w_i + w_j + compliance / h^2)
+    given: Array                # (C,) real m; stretch that the spring's tension already accounts for
+
+
+class Gravity(NamedTuple):
+    acceleration: Array         # (3, n) real m/s^2; 0 for what is pinned
+
+
+class Wind(NamedTuple):
+    """Triangles of cloth, in runs of triangles that share no particle."""
+
+    first: Array                # (3, R) int 1
+    count: Array                # (R,) int 1
+    data: Array                 # (R,) int 1
+    velocity: Array             # (3, T) real m/s; of the air
+    share: Array                # (3, T) real m^3/kg; density/2 times each corner's third of the force, over its mass
+
+
+class Drag(NamedTuple):
+    linear: Array               # (n,) real 1/s
+    quadratic: Array            # (n,) real 1/m
+    air: Array | None           # (3, n) real m/s; None in still air
+
+
+class Damping(NamedTuple):
+    rate: Array                 # (n,) real 1/s
+
+
+class Paths(NamedTuple):
+    """Piecewise linear motion in time, at rest before the first knot and after the last."""
+
+    first: Array                # (M + 1,) int 1; knots of path m are first[m] to first[m + 1]
+    time: Array                 # (Q,) double s
+    point: Array                # (3, Q) double m
+
+
+class Carried(NamedTuple):
+    """Pinned particles that follow a path."""
+
+    particle: Array             # (M,) int 1
+    start: Array                # (3, M) double m; position at the path's first knot
+    paths: Paths
+
+
+class Moving(NamedTuple):
+    """Colliders that follow a path or spin about an axis through their position."""
+
+    collider: Array             # (M,) int 1
+    rotation: Array             # (3, 3, M) double 1; at time 0
+    spin: Array                 # (3, M) double rad/s
+    paths: Paths
+
+
+class Solids(NamedTuple):
+    """Colliders. A room is six planes. Poses are those at the start and at the end of the current substep."""
+
+    kind: Array                 # (K,) int 1; PLANE, BOX, SPHERE or CYLINDER
+    extent: Array               # (4, K) double m; plane: unit normal, offset; box: half edges; sphere: radius; cylinder: radius, half length
+    origin: Array               # (3, K) double m; at the end of the substep
+    rotation: Array             # (3, 3, K) double 1; columns are the axes, at the end of the substep
+    origin_before: Array        # (3, K) double m
+    rotation_before: Array      # (3, 3, K) double 1
+    reach: Array                # (K,) double m; radius of a sphere about the origin that holds it, infinite for planes
+
+
+class Contacts(NamedTuple):
+    """Particles that touch a collider in this substep, each a plane that it must stay above."""
+
+    solids: Solids
+    radius: Array               # (n,) real m; contact radius
+    margin: float               # double m; how near a particle must come to be listed
+    count: Array                # (1,) int 1; contacts listed
+    particle: Array             # (L,) int 1
+    solid: Array                # (L,) int 1
+    normal: Array               # (3, L) double 1
+    bound: Array                # (L,) double m; normal . position must not be below it
+    anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
+    push: Array                 # (L,) double m; displacement along the normal given so far
+
+
+class Friction(NamedTuple):
+    particle: Array             # (2, n) real 1; static and dynamic
+    solid: Array                # (2, K) double 1
+
+
+class Restitution(NamedTuple):
+    particle: Array             # (n,) real 1
+    solid: Array                # (K,) double 1
+    rebound: Array              # (L,) double m; displacement along the normal after the impact, 0 where there is none
+
+
+class Effects(NamedTuple):
+    """What the scene calls for; what it does not is None and no part of the compiled frame."""
+
+    gravity: Gravity | None
+    wind: Wind | None
+    drag: Drag | None
+    damping: Damping | None
+    carried: Carried | None
+    moving: Moving | None
+    contact: Contacts | None
+    friction: Friction | None
+    restitution: Restitution | None
+
+
+class Solver(NamedTuple):
+    step: float                 # double s
+    substeps: int               # int 1; a frame
+    passes: int                 # int 1; over all constraints a substep
+    tolerance: float | None     # double 1; relative; None: every constraint is relaxed
+    approximate: int | None     # int 1; None: exact square roots
+
+
+class Observed(NamedTuple):
+    """What the observables of a frame need to know."""
+
+    scene_order: Array          # (N,) int 1; inner index of each particle of the file
+    mass: Array                 # (N,) double kg
+    gravity: Array | None       # (3, N) double m/s^2; for the potential energy, pinned particles included
+    pairs: Array                # (2, D) int 1; inner indices of the file's distance constraints
+    rest: Array                 # (D,) double m
+
+
+class Snapshot(NamedTuple):
+    """The state at a frame's time, kept while the next substep completes the frame's central difference."""
+
+    position: Array             # (3, n) real m
+    before: Array               # (3, n) real m; one substep earlier
+    counts: Array               # (3,) int 1; relaxations since the last frame, contacts of its last substep, relaxations of the frame
+
+
+class World(NamedTuple):
+    """Everything that a simulation is."""
+
+    particles: Particles
+    runs: Runs | None
+    runs_softness: Softness | None
+    sticks: Sticks | None
+    sticks_softness: Softness | None
+    angles: Angles | None
+    effects: Effects
+    solver: Solver
+    observed: Observed
+    snapshot: Snapshot
+    clock: Array                # (4,) int 1; frame of the chunk, substep of the frame, substep of all, stage
+
+
+class Frames(NamedTuple):
+    """A chunk of frames, particles in the order of the file."""
+
+    position: Array             # (F, N, 3) file m
+    velocity: Array | None      # (F, N, 3) file m/s
+    measures: Array             # (F, M) double; columns as in kernels/observe.py
+
+
+def gate(values: Any, dtype: Any) -> Array:
+    """The one way into a kernel: C-contiguous, of exactly this type, so that no signature is compiled twice."""
+    return np.require(np.asarray(values), dtype=dtype, requirements=["C", "A", "W", "O"])

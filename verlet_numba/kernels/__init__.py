@@ -1,0 +1,1 @@
+"""Loops over buffers, one phase of the substep a file."""

@@ -1,0 +1,122 @@
+"""What a frame shows: positions and velocities in the order of the file, and the observables."""
+
+import math
+
+import numpy as np
+
+from verlet_numba._jit import kernel
+
+KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9
+ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
+COLUMNS = 20
+FAR = 1e30
+
+
+@kernel
+def keep(particles, snapshot, contacts):
+    """At a frame's time: keep the state that the next substep completes."""
+    for axis in range(3):
+        place, before = snapshot.position[axis], snapshot.before[axis]
+        now, earlier = particles.position[axis], particles.previous[axis]
+        for k in range(now.size):
+            place[k], before[k] = now[k], earlier[k]
+    snapshot.counts[1], snapshot.counts[2], snapshot.counts[0] = contacts, snapshot.counts[0], 0
+
+
+@kernel
+def record(output, values, order):
+    """Copy positions to a frame of the file, particle by particle in its order."""
+    x, y, z = values[0], values[1], values[2]
+    for p in range(order.size):
+        k = order[p]
+        output[p, 0], output[p, 1], output[p, 2] = x[k], y[k], z[k]
+
+
+@kernel
+def record_velocity(output, f, position, before, order, h):
+    """Central differences about the frame's time: second order in the step. Only where the file asks for velocities."""
+    if output is None:
+        return
+    scale = 0.5 / h
+    for p in range(order.size):
+        k = order[p]
+        for axis in range(3):
+            output[f, p, axis] = (float(position[axis, k]) - before[axis, k]) * scale
+
+
+@kernel
+def observe(row, position, snapshot, observed, h):
+    """Energies, momenta and constraint errors of the kept frame, in double precision. False: not finite, or lost in space."""
+    row[:] = 0.0
+    energies(row, position, snapshot, observed, h)
+    constraint_errors(row, snapshot.position, observed.pairs, observed.rest)
+    row[CONTACTS], row[RELAXATIONS] = snapshot.counts[1], snapshot.counts[2]
+    return np.isfinite(row[KINETIC]) and np.isfinite(row[ERROR_RMS]) and row[SPEED_MAX] < FAR and in_space(snapshot.position)
+
+
+@kernel
+def in_space(position):
+    """Whether every coordinate is a number that a float32 file can hold."""
+    for axis in range(3):
+        x, lost = position[axis], 0
+        for k in range(x.size):
+            lost += not (abs(x[k]) < FAR)
+        if lost > 0:
+            return False
+    return True
+
+
+@kernel
+def energies(row, position, snapshot, observed, h):
+    """Sums over the particles of the file; velocities by central difference (Hairer, Lubich, Wanner 2003, eq. 1.4)."""
+    total, fastest, scale = 0.0, 0.0, 0.5 / h
+    for p in range(observed.scene_order.size):
+        k, m = observed.scene_order[p], observed.mass[p]
+        x, y, z = float(snapshot.position[0, k]), float(snapshot.position[1, k]), float(snapshot.position[2, k])
+        u = (float(position[0, k]) - snapshot.before[0, k]) * scale
+        v = (float(position[1, k]) - snapshot.before[1, k]) * scale
+        w = (float(position[2, k]) - snapshot.before[2, k]) * scale
+        square = u * u + v * v + w * w
+        row[KINETIC] += 0.5 * m * square
+        fastest = max(fastest, square)
+        row[MOMENTUM] += m * u
+        row[MOMENTUM + 1] += m * v
+        row[MOMENTUM + 2] += m * w
+        row[ANGULAR] += m * (y * w - z * v)
+        row[ANGULAR + 1] += m * (z * u - x * w)
+        row[ANGULAR + 2] += m * (x * v - y * u)
+        row[CENTRE] += m * x
+        row[CENTRE + 1] += m * y
+        row[CENTRE + 2] += m * z
+        total += m
+    potential(row, snapshot.position, observed.scene_order, observed.mass, observed.gravity)
+    row[TOTAL] = row[KINETIC] + row[POTENTIAL]
+    for axis in range(3):
+        row[CENTRE + axis] /= total if total > 0.0 else 1.0
+    row[SPEED_MAX] = math.sqrt(fastest)
+
+
+@kernel
+def potential(row, position, order, mass, gravity):
+    """-m g . x, zero at the origin."""
+    if gravity is None:
+        return
+    for p in range(order.size):
+        k = order[p]
+        row[POTENTIAL] -= mass[p] * (gravity[0, p] * position[0, k] + gravity[1, p] * position[1, k] + gravity[2, p] * position[2, k])
+
+
+@kernel
+def constraint_errors(row, position, pairs, rest):
+    """Largest and root mean square of |d / rest - 1| over distance constraints of positive rest length."""
+    worst, squares, counted = 0.0, 0.0, 0
+    x, y, z = position[0], position[1], position[2]
+    for c in range(rest.size):
+        if rest[c] > 0.0:
+            i, j = pairs[0, c], pairs[1, c]
+            dx, dy, dz = float(x[j]) - x[i], float(y[j]) - y[i], float(z[j]) - z[i]
+            error = abs(math.sqrt(dx * dx + dy * dy + dz * dz) / rest[c] - 1.0)
+            worst, counted = max(worst, error), counted + 1
+            squares += error * error
+    row[ERROR_MAX] = worst
+    row[ERROR_RMS] = math.sqrt(squares / counted) if counted > 0 else 0.0

@@ -1,0 +1,27 @@
+"""One relaxation pass over all angle constraints (paper, 4)."""
+
+from verlet_numba._jit import kernel
+from verlet_numba.physics.angle import bend
+
+
+@kernel
+def relax_angles(position, inverse_mass, angles):
+    """Bring every angle to its rest value, one after another, in double precision. Returns the number relaxed."""
+    if angles is None:
+        return 0
+    x, y, z = position[0], position[1], position[2]
+    for a in range(angles.rest.size):
+        i, j, k = angles.corners[0, a], angles.corners[1, a], angles.corners[2, a]
+        jx, jy, jz = float(x[j]), float(y[j]), float(z[j])
+        moved = bend(x[i] - jx, y[i] - jy, z[i] - jz, x[k] - jx, y[k] - jy, z[k] - jz, angles.rest[a],
+                     float(inverse_mass[i]), float(inverse_mass[j]), float(inverse_mass[k]))
+        x[i] += moved[0]
+        y[i] += moved[1]
+        z[i] += moved[2]
+        x[j] += moved[3]
+        y[j] += moved[4]
+        z[j] += moved[5]
+        x[k] += moved[6]
+        y[k] += moved[7]
+        z[k] += moved[8]
+    return angles.rest.size

@@ -1,0 +1,1 @@
+"""Formulas: scalars in, scalars out, one family a file."""

@@ -1,0 +1,20 @@
+"""Air against a triangle: F = density/2 area |u.n| (u.n) n, u the air's velocity relative to the triangle, n its normal."""
+
+import math
+
+from verlet_numba._jit import formula
+
+
+@formula
+def pressure(abx, aby, abz, acx, acy, acz, ux, uy, uz, zero):
+    """Force over density/2 [m^4/s^2]: area |u.n| (u.n) n, from two edges [m] and the relative velocity [m/s].
+
+    With the cross product c = ab x ac, area = |c|/2 and n = c/|c|: the force is |u.c| (u.c) c / (2 |c|^2).
+    `zero` gives the precision and is what a triangle without area feels.
+    """
+    cx, cy, cz = aby * acz - abz * acy, abz * acx - abx * acz, abx * acy - aby * acx
+    squared = cx * cx + cy * cy + cz * cz
+    along = ux * cx + uy * cy + uz * cz
+    twice = squared + squared
+    scale = abs(along) * along / twice if twice > zero else zero
+    return cx * scale, cy * scale, cz * scale

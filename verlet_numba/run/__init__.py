@@ -1,0 +1,1 @@
+"""Chunks of frames, the trajectory file."""

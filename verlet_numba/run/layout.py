@@ -1,0 +1,173 @@
+"""What stands in a trajectory file before its first frame: H5MD groups, constraints, bodies, provenance, VTK's view.
+
+What the readers insist on, found by trial:
+
+- VTK's HDF5 cannot read the virtual datasets of libver "latest". ("earliest", "v110") also leaves no "open for
+  writing" mark behind after a kill; SWMR shuts ordinary readers out after one.
+- The H5MD attribute unit="m" makes MDAnalysis fail; the CF attribute units="m" does not.
+- Every dimension needs a scale, or xarray refuses its group.
+- Stock VTK reads gzip and shuffle, not lzf, blosc or zstd.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verlet_numba import __version__
+from verlet_numba.run.vtkhdf import create_vtkhdf, write_static
+
+FORMAT = 1                          # version of the file format
+LIBVER = ("earliest", "v110")
+CHUNK_BYTES = 65536                 # small frames share a chunk of about this size
+CHUNK_FRAMES = 64
+PIECE_BYTES = 4 << 20               # a frame above this size is cut into pieces
+UNITS = {"position": "m", "velocity": "m s-1"}
+
+Integers = NDArray[np.int64]
+
+
+class Quantity(NamedTuple):
+    """One observable of the whole scene: CF units ("1": none), 1 or 3 components, dtype."""
+
+    units: str
+    width: int
+    dtype: str
+
+
+class BodyTable(NamedTuple):
+    """One row a body, in scene order, copies one after another; lists or arrays of B entries."""
+
+    name: list[str]
+    kind: list[str]
+    first_particle: ArrayLike
+    particles: ArrayLike
+    first_face: ArrayLike           # among the scene's triangles
+    faces: ArrayLike
+    mass: ArrayLike                 # kg
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """All that is known of a trajectory before its first frame. Particles in file order: scene order, body by body."""
+
+    particles: int
+    pairs: Integers                             # (C, 2) distance constraints
+    lengths: NDArray[np.float64]                # (C,) m
+    lines: list[Integers]                       # polylines
+    polygons: Integers                          # (F, 3) triangles
+    bodies: BodyTable
+    observables: dict[str, Quantity]
+    provenance: dict[str, str | int | float]    # scene_text, scene (JSON), command, seed, versions, cpu, start
+    fields: tuple[str, ...] = ("position",)     # position first; velocity
+    dtype: str = "f4"
+    precision_bits: int = 24                    # significant bits of a stored float; 23 and less round
+
+    def cells(self) -> tuple[dict[str, Any], Integers]:
+        """VTK's vertices (particles on no line and no triangle, so that they show), lines, polygons; body of each."""
+        drawn = np.concatenate([np.zeros(0, np.int64), np.ravel(self.polygons), *self.lines])
+        vertices = np.setdiff1d(np.arange(self.particles), drawn)
+        firsts = np.concatenate([vertices, [line[0] for line in self.lines], self.polygons[:, 0]]).astype(np.int64)
+        body = np.searchsorted(np.asarray(self.bodies.first_particle), firsts, side="right") - 1
+        return {"Vertices": vertices[:, None], "Lines": self.lines, "Polygons": self.polygons}, body
+
+
+def chunk_shape(particles: int, dtype: str, planned_frames: int) -> tuple[int, int, int]:
+    """About 64 KiB of whole frames; one frame from 5,000 particles on; equal pieces of a frame above 4 MiB."""
+    frame = particles * 3 * np.dtype(dtype).itemsize
+    frames = max(1, min(CHUNK_FRAMES, planned_frames, CHUNK_BYTES // frame))
+    return frames, -(-particles // -(-frame // PIECE_BYTES)), 3
+
+
+def create_layout(file: h5py.File, contents: Contents, planned_frames: int) -> None:
+    """Create every group and dataset of a trajectory, with no frame in it."""
+    sources = _create_trajectory(file, contents, planned_frames)
+    _create_observables(file, contents.observables)
+    _create_constraints(file.create_group("connectivity/distance"), contents)
+    _create_bodies(file.create_group("bodies"), contents.bodies)
+    _create_provenance(file.create_group("provenance"), contents.provenance)
+    create_vtkhdf(file, *contents.cells(), sources, planned_frames)
+
+
+def _scale(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
+    """A dimension without values of its own, as netCDF-4 writes it; it takes no space."""
+    scale = group.create_dataset(name, (size,), np.int8)
+    scale.make_scale(f"This is a netCDF dimension but not a netCDF variable. {size:9d}")
+    return scale
+
+
+def _attach(dataset: h5py.Dataset, *scales: h5py.Dataset) -> None:
+    for axis, scale in enumerate(scales):
+        dataset.dims[axis].attach_scale(scale)
+
+
+def _create_trajectory(file: h5py.File, contents: Contents, planned_frames: int) -> dict[str, h5py.Dataset]:
+    root = file.create_group("h5md")
+    root.attrs["version"] = np.array([1, 1], np.int32)
+    root.create_group("author").attrs["name"] = "unknown"
+    creator = root.create_group("creator")
+    creator.attrs["name"], creator.attrs["version"] = "verlet-numba", __version__
+    group = file.create_group("particles/trajectory")
+    box = group.create_group("box")
+    box.attrs["dimension"], box.attrs["boundary"] = 3, np.array([b"none"] * 3)
+    time = group.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(512,))
+    time.make_scale("time")
+    time.attrs["units"] = "s"
+    step = group.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(512,))
+    group["spatial"] = np.array(list("xyz"), "S1")
+    group["spatial"].make_scale("spatial")
+    particle = _scale(group, "particle", contents.particles)
+    _attach(step, time)
+    values = {}
+    for name in contents.fields:
+        element = group.create_group(name)
+        values[name] = element.create_dataset(
+            "value", (0, contents.particles, 3), contents.dtype, maxshape=(None, contents.particles, 3),
+            chunks=chunk_shape(contents.particles, contents.dtype, planned_frames),
+            compression="gzip", compression_opts=1, shuffle=True)
+        values[name].attrs["units"] = UNITS[name]
+        _attach(values[name], time, particle, group["spatial"])
+        element["time"], element["step"] = time, step
+    return values
+
+
+def _create_observables(file: h5py.File, observables: dict[str, Quantity]) -> None:
+    trajectory = file["particles/trajectory"]
+    group = file.create_group("observables")
+    for name, quantity in observables.items():
+        element = group.create_group(name)
+        tail = () if quantity.width == 1 else (quantity.width,)
+        value = element.create_dataset("value", (0, *tail), quantity.dtype, maxshape=(None, *tail), chunks=(512, *tail))
+        value.attrs["units"] = quantity.units
+        element["time"], element["step"] = trajectory["time"], trajectory["step"]
+        _attach(value, *(trajectory[scale] for scale in ("time", "spatial")[:value.ndim]))
+
+
+def _create_constraints(group: h5py.Group, contents: Contents) -> None:
+    constraint, end = _scale(group, "constraint", len(contents.pairs)), _scale(group, "end", 2)
+    _attach(write_static(group, "pairs", contents.pairs.astype(np.int32)), constraint, end)
+    length = write_static(group, "length", contents.lengths.astype(np.float64))
+    length.attrs["units"] = "m"
+    _attach(length, constraint)
+
+
+def _create_bodies(group: h5py.Group, bodies: BodyTable) -> None:
+    scale = _scale(group, "body", len(bodies.name))
+    for name, column in bodies._asdict().items():
+        if name in ("name", "kind"):
+            dataset = group.create_dataset(name, data=column, dtype=h5py.string_dtype())
+        else:
+            dataset = write_static(group, name, np.asarray(column, np.float64 if name == "mass" else np.int64))
+        _attach(dataset, scale)
+    group["mass"].attrs["units"] = "kg"
+
+
+def _create_provenance(group: h5py.Group, provenance: dict[str, str | int | float]) -> None:
+    """`status` and `end` have a fixed size, so that they change in place."""
+    group.attrs["format"] = FORMAT
+    for name, value in {**provenance, "timing": "{}"}.items():
+        group[name] = value
+    group.create_dataset("status", (), "S16", data=b"running")
+    group.create_dataset("end", (), "S40", data=b"")

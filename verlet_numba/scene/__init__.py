@@ -1,0 +1,1 @@
+"""A scene file becomes bodies, bodies become buffers and a plan."""

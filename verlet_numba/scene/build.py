@@ -1,0 +1,135 @@
+"""A scene's bodies become the world that the frame loop advances."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from verlet_numba.buffers import Array, Effects, Frames, Observed, Particles, Snapshot, Solver, World, gate
+from verlet_numba.frame import FULL, SUBSTEP, accelerate, advance
+from verlet_numba.kernels.observe import COLUMNS
+from verlet_numba.scene import forces
+from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.colliders import carried, contact_of, room, spread
+from verlet_numba.scene.constraints import constraints
+from verlet_numba.scene.numbering import Numbering, number, padded
+from verlet_numba.scene.schema import Scene
+
+
+@dataclass
+class Model:
+    """A scene ready to run: its bodies, their numbering and the buffers."""
+
+    scene: Scene
+    bodies: list[Body]
+    numbering: Numbering
+    world: World
+
+    @property
+    def particles(self) -> int:
+        """Particles of the file."""
+        return len(self.world.observed.scene_order)
+
+
+def build(scene: Scene, bodies: list[Body]) -> Model:
+    """Number the particles, lay out the constraints and start Verlet's recursion."""
+    real = np.dtype(scene.solver.precision)
+    numbering = number(bodies)
+    size = padded(numbering.size, real.itemsize)
+    step = 1.0 / (scene.time.frame_rate * scene.solver.substeps)
+    masses = [np.broadcast_to(body.shape.masses, index.shape) for body, index in zip(bodies, numbering.bodies, strict=True)]
+    moves = [np.broadcast_to(~body.pinned, index.shape) for body, index in zip(bodies, numbering.bodies, strict=True)]
+    inverse_mass = spread(numbering, [move / mass for move, mass in zip(moves, masses, strict=True)], size)
+
+    effects = effects_of(scene, bodies, numbering, inverse_mass, real)
+    joined = constraints(bodies, numbering, attachments(scene, bodies, numbering), inverse_mass, step, scene.solver.iterations, real)
+    solver = Solver(step, scene.solver.substeps, scene.solver.iterations,
+                    scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
+    particles, snapshot = state(size, inverse_mass, effects, real)
+    observed = observed_of(scene, bodies, numbering)
+    clock = gate(np.zeros(4), np.int64)
+    clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
+    world = World(particles, *joined, effects, solver, observed, snapshot, clock)
+    start(world, numbering, bodies)
+    return Model(scene, bodies, numbering, world)
+
+
+def effects_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Effects:
+    """What the scene calls for, None for everything else."""
+    contact = contact_of(scene, bodies, numbering, inverse_mass, real)
+    return Effects(forces.gravity(scene.effects, inverse_mass, real),
+                   forces.wind(scene.effects, bodies, numbering, inverse_mass, real),
+                   forces.drag(scene.effects, inverse_mass, real),
+                   forces.damping(scene.effects, inverse_mass, real),
+                   carried(bodies, numbering), *contact)
+
+
+def state(size: int, inverse_mass: Floats, effects: Effects, real: Any) -> tuple[Particles, Snapshot]:
+    """Empty particles and snapshot; an acceleration only if something accelerates."""
+    accelerates = any(effect is not None for effect in (effects.gravity, effects.wind, effects.drag, effects.damping))
+    rows = [gate(np.zeros((3, size)), real) for _ in range(5)]
+    particles = Particles(rows[0], rows[1], gate(inverse_mass, real), rows[2] if accelerates else None)
+    return particles, Snapshot(rows[3], rows[4], gate(np.zeros(3), np.int64))
+
+
+def observed_of(scene: Scene, bodies: list[Body], numbering: Numbering) -> Observed:
+    """What observables need, in the order of the file."""
+    order = numbering.scene_order
+    mass = np.concatenate([np.zeros(0), *(np.tile(body.shape.masses, body.copies) for body in bodies)])
+    pairs = [index[:, body.shape.sticks.reshape(-1, 2)].reshape(-1, 2) for body, index in zip(bodies, numbering.bodies, strict=True)]
+    rest = [np.tile(body.shape.lengths, body.copies) for body in bodies]
+    gravity = None
+    if scene.effects.gravity is not None:
+        gravity = gate(np.repeat(np.array(scene.effects.gravity, float)[:, None], len(order), 1), np.float64)
+    return Observed(gate(order, np.int64), gate(mass, np.float64), gravity,
+                    gate(np.concatenate([np.zeros((0, 2), np.int64), *pairs]).T, np.int64),
+                    gate(np.concatenate([np.zeros(0), *rest]), np.float64))
+
+
+def attachments(scene: Scene, bodies: list[Body], numbering: Numbering) -> Integers:
+    """(A, 2) inner indices of the particles that stay together."""
+    named = {body.name: index for body, index in zip(bodies, numbering.bodies, strict=True)}
+    rows = [(named[a].ravel()[i], named[b].ravel()[j]) for a, i, b, j in scene.attachments]
+    return np.array(rows, np.int64).reshape(-1, 2)
+
+
+def start(world: World, numbering: Numbering, bodies: list[Body]) -> None:
+    """Positions and the previous positions x0 - v0 h + a0 h^2/2: exact for constant acceleration.
+
+    x0 - v0 h alone would put an error of -g h t/2 into free fall.
+    """
+    particles, h = world.particles, world.solver.step
+    position, velocity = (np.zeros(particles.position.shape) for _ in range(2))
+    for body, index in zip(bodies, numbering.bodies, strict=True):
+        position[:, index] = np.moveaxis(body.positions, 2, 0)
+        velocity[:, index] = np.where(body.pinned, 0.0, np.moveaxis(body.velocities, 2, 0))
+    particles.position[:] = position
+    particles.previous[:] = position - velocity * h
+    if particles.acceleration is not None:
+        accelerate(particles, world.effects, h)
+        particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
+
+
+def frames(model: Model, count: int) -> Frames:
+    """Room for a chunk of frames."""
+    output, shape = model.scene.output, (count, model.particles, 3)
+    velocity: Array | None = np.empty(shape, output.precision) if "velocity" in output.fields else None
+    return Frames(np.empty(shape, output.precision), velocity, np.empty((count, COLUMNS)))
+
+
+def grown(world: World) -> World:
+    """The same world with room for twice the contacts; those listed so far are found again."""
+    effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
+    assert contact is not None
+    capacity = 2 * contact.particle.size
+    contact = contact._replace(**dict(zip(("particle", "solid", "normal", "bound", "anchor", "push"), room(capacity), strict=True)))
+    if restitution is not None:
+        restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
+    return world._replace(effects=effects._replace(contact=contact, restitution=restitution))
+
+
+def run_chunk(model: Model, chunk: Frames) -> int:
+    """Advance by a chunk of frames from the clock's frame 0, growing what is full. Returns OK or DIVERGED."""
+    while (status := advance(model.world, chunk)) == FULL:
+        model.world = grown(model.world)
+    return int(status)

@@ -1,0 +1,167 @@
+"""Colliders of a scene as buffers: solids in their poses, what moves them, and the contacts of particles with them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from verlet_numba.buffers import Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Solids, gate
+from verlet_numba.physics.solids import BOX, CYLINDER, PLANE, SPHERE
+from verlet_numba.scene.body import Body, Floats
+from verlet_numba.scene.numbering import Numbering
+from verlet_numba.scene.schema import Scene
+from verlet_numba.scene.schema_colliders import BaseCollider
+
+ROOM_WALLS = [(axis, side) for axis in range(3) for side in (-1.0, 1.0)]
+MARGIN = 0.05           # of the shortest stick: how near a particle is listed, since relaxation may still bring it in
+FIRST_ROOM = 64         # contacts; buffers grow as needed
+
+
+class Solid(NamedTuple):
+    """One convex surface of a collider."""
+
+    kind: int
+    extent: tuple[float, float, float, float]
+    origin: Floats
+    rotation: Floats        # (3, 3), columns are its axes
+    reach: float
+    collider: BaseCollider
+
+
+def turned_to(axis: Any) -> Floats:
+    """A rotation whose third column is the unit vector along `axis`."""
+    w = np.array(axis, float) / np.linalg.norm(axis)
+    u = np.cross(w, np.eye(3)[np.argmin(np.abs(w))])
+    u /= np.linalg.norm(u)
+    return np.stack([u, np.cross(w, u), w], axis=1)
+
+
+def solids(collider: Any) -> list[Solid]:
+    """The surfaces of a collider: a room has six, every other kind one."""
+    identity, far = np.eye(3), np.inf
+    start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
+    if collider.path and not {"point", "position"} & collider.model_fields_set:
+        start = np.array(collider.path[0][1:], float)
+    match collider.kind:
+        case "plane":
+            x, y, z = np.array(collider.normal, float) / np.linalg.norm(collider.normal)
+            return [Solid(PLANE, (x, y, z, 0.0), start, identity, far, collider)]
+        case "room":
+            walls = [(-side * np.eye(3)[axis], -0.5 * collider.size[axis]) for axis, side in ROOM_WALLS]
+            return [Solid(PLANE, (*normal, offset), start, identity, far, collider) for normal, offset in walls]
+        case "box":
+            half = 0.5 * np.array(collider.size)
+            return [Solid(BOX, (*half, 0.0), start, identity, float(np.linalg.norm(half)), collider)]
+        case "sphere":
+            return [Solid(SPHERE, (collider.radius, 0.0, 0.0, 0.0), start, identity, collider.radius, collider)]
+        case "cylinder":
+            half = 0.5 * collider.length
+            extent = (collider.radius, half, 0.0, 0.0)
+            return [Solid(CYLINDER, extent, start, turned_to(collider.axis), float(np.hypot(collider.radius, half)), collider)]
+    raise AssertionError(f"collider kind {collider.kind}")
+
+
+def paths(points: list[Floats]) -> Paths:
+    """Paths from their knots, (M, 4) t, x, y, z each."""
+    first = np.cumsum([0, *map(len, points)])
+    knots = np.concatenate([np.zeros((0, 4)), *points])
+    return Paths(gate(first, np.int64), gate(knots[:, 0], np.float64), gate(knots[:, 1:].T, np.float64))
+
+
+def solids_of(scene: Scene) -> tuple[list[Solid], Solids]:
+    """All surfaces of a scene at time 0."""
+    found = [solid for collider in scene.colliders for solid in solids(collider)]
+    origin = np.array([solid.origin for solid in found]).reshape(-1, 3).T
+    rotation = np.array([solid.rotation for solid in found]).reshape(-1, 3, 3).transpose(1, 2, 0)
+    extent = np.array([solid.extent for solid in found]).reshape(-1, 4).T
+    return found, Solids(gate([solid.kind for solid in found], np.int64), gate(extent, np.float64),
+                         gate(origin, np.float64), gate(rotation, np.float64),
+                         gate(origin.copy(), np.float64), gate(rotation.copy(), np.float64),
+                         gate([solid.reach for solid in found], np.float64))
+
+
+def moving(found: list[Solid]) -> Moving | None:
+    """What moves the surfaces whose collider has a path or a spin."""
+    indices = [k for k, solid in enumerate(found) if solid.collider.path or solid.collider.spin]
+    if not indices:
+        return None
+    spins, points = [], []
+    for k in indices:
+        spin, path, origin = found[k].collider.spin, found[k].collider.path, found[k].origin
+        spins.append(spin.rate * np.array(spin.axis) / np.linalg.norm(spin.axis) if spin else np.zeros(3))
+        knots = np.array(path, float) if path else np.array([[0.0, 0.0, 0.0, 0.0]])
+        knots[:, 1:] += origin - knots[0, 1:]
+        points.append(knots)
+    rotation = np.stack([found[k].rotation for k in indices], axis=2)
+    return Moving(gate(indices, np.int64), gate(rotation, np.float64), gate(np.array(spins).T, np.float64), paths(points))
+
+
+def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
+    """Pinned particles of bodies with a path."""
+    particles, starts, points = [], [], []
+    for body, index in zip(bodies, numbering.bodies, strict=True):
+        if body.path is not None:
+            particles.append(index[:, body.pinned].ravel())
+            starts.append(body.positions[:, body.pinned].reshape(-1, 3))
+            points += [body.path] * particles[-1].size
+    if not points:
+        return None
+    return Carried(gate(np.concatenate(particles), np.int64), gate(np.concatenate(starts).T, np.float64), paths(points))
+
+
+class Contact(NamedTuple):
+    moving: Moving | None
+    contact: Contacts | None
+    friction: Friction | None
+    restitution: Restitution | None
+
+
+def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Contact:
+    """Contact with colliders and the materials that meet; all None without colliders, particles or the wish."""
+    if not scene.colliders or scene.effects.contact == "none" or not (inverse_mass > 0).any():
+        return Contact(None, None, None, None)
+    found, arrays = solids_of(scene)
+    lengths = np.concatenate([np.zeros(0), *(body.shape.lengths for body in bodies)])
+    margin = MARGIN * float(lengths[lengths > 0].min(initial=0.0 if not (lengths > 0).any() else np.inf))
+    radius = spread(numbering, [np.full(index.shape, body.shape.radius) for body, index in zip(bodies, numbering.bodies, strict=True)],
+                    len(inverse_mass))
+    contact = Contacts(arrays, gate(radius, real), margin, gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
+    return Contact(moving(found), contact, friction_of(scene, found, bodies, numbering, len(inverse_mass), real),
+                   restitution_of(scene, found, bodies, numbering, len(inverse_mass), real))
+
+
+def room(capacity: int) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Empty contact buffers: particle, solid, normal, bound, anchor, push."""
+    return (gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros((3, capacity)), np.float64),
+            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64))
+
+
+def spread(numbering: Numbering, values: list[Any], size: int) -> Floats:
+    """(size,) values (K, P) of every body at their inner indices, 0 for ghosts."""
+    result = np.zeros(size)
+    for index, value in zip(numbering.bodies, values, strict=True):
+        result[index] = value
+    return result
+
+
+def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, real: Any) -> Friction | None:
+    """Coefficients of particles and surfaces; None if no two that may meet have any: they meet with sqrt(a b)."""
+    default = scene.effects.friction
+    pairs = [solid.collider.friction or default for solid in found]
+    solid = np.array([[pair.static, pair.dynamic] if pair else [0.0, 0.0] for pair in pairs]).T
+    particle = np.stack([spread(numbering, [np.full(index.shape, body.friction[which]) for body, index
+                                            in zip(bodies, numbering.bodies, strict=True)], size) for which in range(2)])
+    if not particle.any() or not solid.any():
+        return None
+    return Friction(gate(particle, real), gate(solid, np.float64))
+
+
+def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, real: Any) -> Restitution | None:
+    """Coefficients of particles and surfaces; None if all are 0: two that meet take the larger."""
+    default = scene.effects.restitution or 0.0
+    given = [solid.collider.restitution for solid in found]
+    solid = np.array([default if value is None else value for value in given])
+    particle = spread(numbering, [np.full(index.shape, body.restitution) for body, index
+                                  in zip(bodies, numbering.bodies, strict=True)], size)
+    if not particle.any() and not solid.any():
+        return None
+    return Restitution(gate(particle, real), gate(solid, np.float64), gate(np.zeros(FIRST_ROOM), np.float64))

@@ -1,0 +1,56 @@
+"""What accelerates the particles of a scene, as buffers; None for what the scene does not name."""
+
+from typing import Any
+
+import numpy as np
+
+from verlet_numba.buffers import Damping, Drag, Gravity, Wind, gate
+from verlet_numba.scene.body import Body, Floats
+from verlet_numba.scene.constraints import per_copy
+from verlet_numba.scene.numbering import Numbering
+from verlet_numba.scene.runs import joined, lanes
+from verlet_numba.scene.schema import Effects
+
+
+def lanes_of(vector: tuple[float, float, float], moves: Any, real: Any) -> Any:
+    """(3, n) a vector for every particle that moves, zero for the others."""
+    return gate(np.where(moves, np.array(vector, float)[:, None], 0.0), real)
+
+
+def gravity(effects: Effects, inverse_mass: Floats, real: Any) -> Gravity | None:
+    if effects.gravity is None:
+        return None
+    return Gravity(lanes_of(effects.gravity, inverse_mass > 0, real))
+
+
+def drag(effects: Effects, inverse_mass: Floats, real: Any) -> Drag | None:
+    if effects.drag is None:
+        return None
+    moves = inverse_mass > 0
+    air = None if effects.wind is None else lanes_of(effects.wind.velocity, moves, real)
+    return Drag(gate(np.where(moves, effects.drag.linear, 0.0), real), gate(np.where(moves, effects.drag.quadratic, 0.0), real), air)
+
+
+def damping(effects: Effects, inverse_mass: Floats, real: Any) -> Damping | None:
+    if effects.damping is None:
+        return None
+    return Damping(gate(np.where(inverse_mass > 0, effects.damping, 0.0), real))
+
+
+def wind(effects: Effects, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Wind | None:
+    """Wind on the triangles of every cloth; None if the scene has none."""
+    groups = [group for group in numbering.groups if group.shape.kind == "cloth" and len(group.shape.triangles)]
+    if effects.wind is None or not groups:
+        return None
+    firsts, counts, shares = [], [], []
+    for group in groups:
+        laid = lanes(group, group.shape.triangles)
+        start = np.repeat(laid.first, laid.count, axis=1)
+        corner = start + (np.arange(laid.count.sum()) - np.repeat(np.cumsum(laid.count) - laid.count, laid.count))
+        firsts.append(laid.first)
+        counts.append(laid.count)
+        shares.append(np.where(laid.active, effects.wind.density / 6.0 * inverse_mass[corner], 0.0))
+    count, share = joined(counts), np.concatenate(shares, axis=1)
+    velocity = np.repeat(np.array(effects.wind.velocity, float)[:, None], share.shape[1], axis=1)
+    return Wind(gate(np.concatenate(firsts, axis=1), np.int64), gate(count, np.int64), gate(np.cumsum(count) - count, np.int64),
+                gate(velocity, real), gate(share, real))

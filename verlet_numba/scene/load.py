@@ -1,0 +1,66 @@
+"""A scene file becomes a validated scene, or a list of everything that is wrong with it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from . import messages, relations
+from .overrides import override
+from .problems import Problem, SceneError
+from .schema import Scene
+from .source import Source, compose, read
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A scene, the document it came from, and the folder that the files it names are relative to."""
+
+    scene: Scene
+    source: Source
+    folder: Path
+
+
+def load(path: str | Path, sets: Sequence[str] = ()) -> Loaded:
+    """The scene in a file, with `PATH=VALUE` overrides. Raises `SceneError` with every problem."""
+    return loads(read(path), str(path), sets)
+
+
+def loads(text: str, name: str, sets: Sequence[str] = ()) -> Loaded:
+    """The scene in `text`; `name` is what problems call it. Raises `SceneError` with every problem."""
+    source, problems = compose(text, name)
+    if source.data is None:
+        raise SceneError([source.problem((), "empty: nothing but white space and comments stands here")])
+    if not isinstance(source.data, dict):
+        raise SceneError([*problems, source.problem((), "a scene is a mapping: `version: 1`, `time: ...` and so on")])
+    source, more = override(source, sets)
+    problems += more
+    scene = None
+    try:
+        scene = Scene.model_validate(source.data)
+    except ValidationError as error:
+        problems += messages.problems(error, source)
+    problems += (source.problem(path, message) for path, message in relations.findings(source.data))
+    if problems or scene is None:
+        raise SceneError(_in_order(problems, source))
+    return Loaded(scene, source, Path(name).parent)
+
+
+def _in_order(problems: Sequence[Problem], source: Source) -> list[Problem]:
+    """In the order of the file, overrides last; of several at one place the first alone, which caused the others."""
+    first: dict[tuple[str, int, int], Problem] = {}
+    for problem in problems:
+        first.setdefault(problem[:3], problem)
+    return sorted(first.values(), key=lambda problem: (problem.file != source.name, problem[:3]))
+
+
+def resolved(scene: Scene) -> dict[str, Any]:
+    """The scene as plain data with every default filled in; loads again as the same scene."""
+    return scene.model_dump(mode="json", by_alias=True)
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of scene files: every key, its description, bounds and default."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema(by_alias=True)}

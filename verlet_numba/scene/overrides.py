@@ -1,0 +1,101 @@
+"""`--set PATH=VALUE`: values laid over a document before it is validated.
+
+PATH is dotted: keys of mappings, indices of lists, names of bodies and colliders. VALUE is YAML. Mappings that are not
+there are made. The document itself stays as it is: what lies along the path is copied.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .messages import did_you_mean
+from .problems import Path, Problem, SceneError
+from .schema_common import entry_name
+from .source import MappingMarks, Marks, Override, Source, compose, pack
+
+
+def override(source: Source, sets: Sequence[str]) -> tuple[Source, list[Problem]]:
+    """The source with every `PATH=VALUE` laid over it, later ones over earlier ones, and what is wrong with them."""
+    problems: list[Problem] = []
+    for argument in sets:
+        try:
+            source, found = _apply(source, argument)
+        except SceneError as error:
+            found = error.problems
+        problems += found
+    return source, problems
+
+
+def _apply(source: Source, argument: str) -> tuple[Source, list[Problem]]:
+    target, equals, text = argument.partition("=")
+    name = f"--set {argument}"
+    if not equals or not text.strip() or "" in target.split("."):
+        raise SceneError([Problem(name, 1, 1, "", "write PATH=VALUE, such as solver.substeps=4")])
+    value, problems = compose(text, name, column=len(target) + 1)
+    steps, column = [], 0
+    for word in target.split("."):
+        steps.append(_Step(word, column, name))
+        column += len(word) + 1
+    data, laid = _lay(source.data, steps, (), _Laid((), value.data, value.marks))
+    own = MappingMarks(0, {str(laid.path[-1]): pack(0, laid.column)}, {str(laid.path[-1]): laid.marks})
+    placed = Override(laid.path, Source(name, argument, laid.data, own))
+    return replace(source, data=data, overrides=(*source.overrides, placed)), problems
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One word of PATH, at `column` (from 0) of the argument."""
+
+    word: str
+    column: int
+    file: str
+
+    def failure(self, done: Path, message: str) -> SceneError:
+        return SceneError([Problem(self.file, 1, self.column + 1, ".".join(map(str, (*done, self.word))), message)])
+
+
+@dataclass(frozen=True)
+class _Laid:
+    """What an override adds: `data` at `path`, its last key at `column` of the argument."""
+
+    path: Path
+    data: Any
+    marks: Marks
+    column: int = 0
+
+
+def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[Any, _Laid]:
+    """A copy of `node`, which stands at `done`, with the given value `steps` further on; and what is new in it."""
+    if not steps:
+        return given.data, replace(given, path=done)
+    step, rest = steps[0], steps[1:]
+    key: str | int = step.word
+    if node is None:
+        inner, laid = _lay(None, rest, (), given)
+        position = pack(0, step.column)
+        made = {step.word: inner}
+        return made, _Laid(done, made, MappingMarks(position, {step.word: position}, {step.word: laid.marks}))
+    if isinstance(node, list):
+        key = _index(node, step, done)
+        inner, laid = _lay(node[key], rest, (*done, key), given)
+        copy: Any = [*node[:key], inner, *node[key + 1 :]]
+    elif isinstance(node, dict):
+        inner, laid = _lay(node.get(step.word), rest, (*done, step.word), given)
+        copy = {**node, step.word: inner}
+    else:
+        raise step.failure(done, "there is no such key: what stands above it is a single value")
+    return copy, replace(laid, column=step.column) if len(laid.path) == len(done) + 1 else laid
+
+
+def _index(entries: list[Any], step: _Step, done: Path) -> int:
+    """The index of a list's entry, given by number or, for bodies and colliders, by name."""
+    if step.word.isascii() and step.word.isdigit():
+        if len(step.word) > 9 or int(step.word) >= len(entries):
+            raise step.failure(done, f"there is no entry {step.word[:20]}: the list has {len(entries)}, from 0")
+        return int(step.word)
+    names = [entry_name(entry, index) for index, entry in enumerate(entries)]
+    if done in (("bodies",), ("colliders",)) and step.word in names:
+        return names.index(step.word)
+    known = [name for name in names if name is not None] if done in (("bodies",), ("colliders",)) else []
+    numbers = f"; its entries are 0 to {len(entries) - 1}" if entries else "; the list is empty"
+    raise step.failure(done, "there is no such entry" + (did_you_mean(step.word, known) or numbers))

@@ -1,0 +1,34 @@
+"""What is wrong with a scene, and where: one `Problem` a finding, all of them in one `SceneError`."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+Path = tuple[str | int, ...]
+"""Where a value stands in a document: keys of mappings and indices of lists, outermost first."""
+
+
+class Problem(NamedTuple):
+    """One finding. `line` and `column` count from 1; `path` is dotted, as `--set` takes it, empty for all of it."""
+
+    file: str
+    line: int
+    column: int
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        where = f"{self.file}:{self.line}:{self.column}"
+        return f"{where}: {self.path}: {self.message}" if self.path else f"{where}: {self.message}"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used; `problems` names every reason, in the order of the file."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems: list[Problem] = list(problems)
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+def dotted(path: Path) -> str:
+    """The path as users write it: `bodies.0.mass`."""
+    return ".".join(map(str, path))

@@ -1,0 +1,75 @@
+"""What a scene may say but this version does not do yet: refused where it stands, never ignored."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from .load import Loaded
+from .problems import Path, Problem
+
+
+class Missing(NamedTuple):
+    """Values of one key, `*` for any entry of a list, that are not built yet."""
+
+    path: str
+    refused: Callable[[Any], bool]
+    instead: str
+
+
+def _any(value: Any) -> bool:
+    return True
+
+
+def _named(value: Any) -> bool:
+    return value is not None
+
+
+def _is(word: object) -> Callable[[Any], bool]:
+    return lambda value: bool(value == word)
+
+
+def _is_not(word: object) -> Callable[[Any], bool]:
+    return lambda value: bool(value != word)
+
+
+_LEAVE_OUT = "leave the key out"
+
+NOT_BUILT = (
+    Missing("solver.preset", _is("paper"), "use `default`"),
+    Missing("solver.order", _is_not("sequential"), "use `sequential`"),
+    Missing("solver.gradient", _is("step_start"), "use `current`"),
+    Missing("solver.repeats", _any, _LEAVE_OUT),
+    Missing("solver.response", _any, _LEAVE_OUT),
+    Missing("solver.projection_point", _any, _LEAVE_OUT),
+    Missing("solver.deformable_contact", _any, _LEAVE_OUT),
+    Missing("solver.broad_phase", _any, _LEAVE_OUT),
+    Missing("solver.orientation_guard", _any, _LEAVE_OUT),
+    Missing("effects.self_collision", _is(True), _LEAVE_OUT),
+    Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
+    Missing("effects.bending", _named, _LEAVE_OUT),
+    Missing("effects.rest", _named, _LEAVE_OUT),
+    Missing("bodies.*.contact_geometry", _is("segments"), "use `nodes`"),
+    Missing("colliders.*.kind", _is("mesh"), "use a box, sphere, cylinder, plane or room"),
+)
+
+
+def unsupported(loaded: Loaded) -> list[Problem]:
+    """Every key written in the file or an override that asks for what is not built yet."""
+    data = loaded.source.data
+    return [loaded.source.problem(path, f"{_shown(path, value)} is not supported yet; {missing.instead}", key=True)
+            for missing in NOT_BUILT for path, value in _matches(data, tuple(missing.path.split(".")), ())
+            if missing.refused(value)]
+
+
+def _shown(path: Path, value: Any) -> str:
+    return f"{path[-1]}: {value}" if isinstance(value, str) else str(path[-1])
+
+
+def _matches(node: Any, pattern: tuple[str, ...], done: Path) -> Iterator[tuple[Path, Any]]:
+    """Paths and values in the document that a pattern names."""
+    if not pattern:
+        yield done, node
+    elif pattern[0] == "*" and isinstance(node, list):
+        for index, entry in enumerate(node):
+            yield from _matches(entry, pattern[1:], (*done, index))
+    elif isinstance(node, dict) and pattern[0] in node:
+        yield from _matches(node[pattern[0]], pattern[1:], (*done, pattern[0]))
