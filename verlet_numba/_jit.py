@@ -21,6 +21,7 @@ import llvmlite.binding as llvm
 import numba
 import numpy as np
 
+config: Any = numba.config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
@@ -65,12 +66,12 @@ if not CACHE.exists():
 
 def kernel(function: Function) -> Function:
     """Compile `function` on first call: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE)
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(CACHE)
     try:
         return numba.njit(cache=True, **FLAGS)(function)  # type: ignore[no-any-return]
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
 def formula(function: Function) -> Function:

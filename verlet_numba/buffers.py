@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-Kinds = {"real": None, "double": np.float64, "int": np.int64, "bool": np.bool_}
+
+PLANE, BOX, SPHERE, CYLINDER = 0, 1, 2, 3               # Solids.kind
+FRAME, SUBSTEP, NUMBER, STAGE = 0, 1, 2, 3              # World.clock
+WHOLE, INTEGRATED = 0, 1                                # its stage: where a substep begins, or is taken up again
+KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
+ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
+COLUMNS = 20
 
 
 class Particles(NamedTuple):
@@ -32,7 +38,7 @@ class Runs(NamedTuple):
     """Runs of independent distance constraints: number m of run r joins particles first[0, r] + m and first[1, r] + m."""
 
     first: Array                # (2, R) int 1
-    count: Array                # (R,) int 1
+    lanes: Array                # (R,) int 1
     data: Array                 # (R,) int 1; where the run's constraints stand in the arrays below
     rest: Array                 # (C,) real m
     weight: Array               # (2, C) real 1; w_i / (w_i + w_j + compliance / h^2); both 0 masks a lane out
@@ -69,7 +75,7 @@ class Wind(NamedTuple):
     """Triangles of cloth, in runs of triangles that share no particle."""
 
     first: Array                # (3, R) int 1
-    count: Array                # (R,) int 1
+    lanes: Array                # (R,) int 1
     data: Array                 # (R,) int 1
     velocity: Array             # (3, T) real m/s; of the air
     share: Array                # (3, T) real m^3/kg; density/2 times each corner's third of the force, over its mass
@@ -128,7 +134,7 @@ class Contacts(NamedTuple):
     solids: Solids
     radius: Array               # (n,) real m; contact radius
     margin: float               # double m; how near a particle must come to be listed
-    count: Array                # (1,) int 1; contacts listed
+    listed: Array               # (1,) int 1; how many contacts there are
     particle: Array             # (L,) int 1
     solid: Array                # (L,) int 1
     normal: Array               # (3, L) double 1
@@ -201,7 +207,7 @@ class World(NamedTuple):
     solver: Solver
     observed: Observed
     snapshot: Snapshot
-    clock: Array                # (4,) int 1; frame of the chunk, substep of the frame, substep of all, stage
+    clock: Array                # (4,) int 1; FRAME of the chunk, SUBSTEP of the frame, NUMBER of substeps of all, STAGE
 
 
 class Frames(NamedTuple):
@@ -209,7 +215,7 @@ class Frames(NamedTuple):
 
     position: Array             # (F, N, 3) file m
     velocity: Array | None      # (F, N, 3) file m/s
-    measures: Array             # (F, M) double; columns as in kernels/observe.py
+    measures: Array             # (F, M) double; columns as numbered above
 
 
 def gate(values: Any, dtype: Any) -> Array:

@@ -5,6 +5,7 @@ once; the compiler drops the branch, so the effect is no part of the machine cod
 """
 
 from verlet_numba._jit import kernel
+from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -14,13 +15,11 @@ from verlet_numba.effects.motion import carry, move
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
-from verlet_numba.kernels.observe import PENETRATION, keep, observe, record, record_velocity
+from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
 
 OK, DIVERGED, FULL = 0, 1, 2
-FRAME, SUBSTEP, NUMBER, STAGE = 0, 1, 2, 3             # of the clock
-WHOLE, INTEGRATED = 0, 1                               # stages: where a substep begins, or is taken up again
 
 
 @kernel

@@ -10,10 +10,24 @@ the push accumulated over the passes: a pass may take back what an earlier one g
 import math
 
 from verlet_numba._jit import kernel
+from verlet_numba.buffers import BOX, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
-from verlet_numba.physics.solids import PLANE, surface
+from verlet_numba.physics.solids import box, cylinder, plane, sphere
 
 BATCH = 128
+
+
+@kernel
+def surface(solids, s, x, y, z):
+    """Signed distance from the surface of solid s [m] and the outward normal, in its own frame."""
+    kind, extent = solids.kind[s], solids.extent
+    if kind == PLANE:
+        return plane(x, y, z, extent[0, s], extent[1, s], extent[2, s], extent[3, s])
+    if kind == BOX:
+        return box(x, y, z, extent[0, s], extent[1, s], extent[2, s])
+    if kind == SPHERE:
+        return sphere(x, y, z, extent[0, s])
+    return cylinder(x, y, z, extent[0, s], extent[1, s])
 
 
 @kernel
@@ -21,7 +35,7 @@ def find_contacts(particles, contact):
     """List the particles within the margin of a collider. False: more than there is room for (grow and call again)."""
     if contact is None:
         return True
-    contact.count[0] = 0
+    contact.listed[0] = 0
     solids, n = contact.solids, particles.inverse_mass.size
     for s in range(solids.kind.size):
         for first in range(0, n, BATCH):
@@ -57,24 +71,23 @@ def any_near(position, radius, solids, s, margin):
 def list_contact(particles, contact, k, s):
     """Make a contact of particle k and solid s if they are near. False: no room."""
     solids, here, before = contact.solids, particles.position, particles.previous
-    e0, e1, e2, e3 = solids.extent[0, s], solids.extent[1, s], solids.extent[2, s], solids.extent[3, s]
     x, y, z = inward(here[0, k], here[1, k], here[2, k], solids.origin, solids.rotation, s)
-    gap, nx, ny, nz = surface(solids.kind[s], x, y, z, e0, e1, e2, e3)
+    gap, nx, ny, nz = surface(solids, s, x, y, z)
     radius = contact.radius[k]
     if gap - radius >= contact.margin:
         return True
-    c = contact.count[0]
+    c = contact.listed[0]
     if c == contact.particle.size:
         return False
     u, v, w = inward(before[0, k], before[1, k], before[2, k], solids.origin_before, solids.rotation_before, s)
     if gap < 0.0:
-        start, mx, my, mz = surface(solids.kind[s], u, v, w, e0, e1, e2, e3)
+        start, mx, my, mz = surface(solids, s, u, v, w)
         if start > 0.0:  # came from outside: the plane through the surface point that it was nearest to
             nx, ny, nz = mx, my, mz
             gap = start + nx * (x - u) + ny * (y - v) + nz * (z - w)
     level = nx * x + ny * y + nz * z - gap + radius
     nx, ny, nz = outward(nx, ny, nz, solids.rotation, s)
-    contact.count[0] = c + 1
+    contact.listed[0] = c + 1
     contact.particle[c], contact.solid[c], contact.push[c] = k, s, 0.0
     contact.normal[0, c], contact.normal[1, c], contact.normal[2, c] = nx, ny, nz
     ox, oy, oz = solids.origin[0, s], solids.origin[1, s], solids.origin[2, s]
@@ -97,7 +110,7 @@ def separate(position, contact):
     """Move every penetrating particle out to its plane; take back what an earlier pass of this substep gave too much."""
     if contact is None:
         return
-    for c in range(contact.count[0]):
+    for c in range(contact.listed[0]):
         k, given = contact.particle[c], contact.push[c]
         push = max(0.0, given - height(position, contact, c))
         if push != given:
@@ -116,7 +129,7 @@ def penetration(position, inverse_mass, contact):
         for k in range(inverse_mass.size):
             if inverse_mass[k] > 0:
                 x, y, z = inward(position[0, k], position[1, k], position[2, k], solids.origin_before, solids.rotation_before, s)
-                gap = surface(solids.kind[s], x, y, z, solids.extent[0, s], solids.extent[1, s], solids.extent[2, s], solids.extent[3, s])[0]
+                gap = surface(solids, s, x, y, z)[0]
                 deepest = max(deepest, contact.radius[k] - gap)
     return deepest
 
@@ -127,6 +140,6 @@ def touching(contact):
     if contact is None:
         return 0
     pushed = 0
-    for c in range(contact.count[0]):
+    for c in range(contact.listed[0]):
         pushed += contact.push[c] > 0.0
     return pushed

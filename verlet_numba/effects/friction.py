@@ -15,7 +15,7 @@ def rub(position, contact, friction):
     """Take back sliding relative to the collider's surface, contact by contact."""
     if friction is None:
         return
-    for c in range(contact.count[0]):
+    for c in range(contact.listed[0]):
         push = contact.push[c]
         if push > 0.0:
             k, s = contact.particle[c], contact.solid[c]

@@ -14,7 +14,7 @@ def foresee(particles, contact, restitution, h):
     """Find the contacts that hit in this substep and raise their bound to the rebound's end."""
     if restitution is None:
         return
-    for c in range(contact.count[0]):
+    for c in range(contact.listed[0]):
         k, s = contact.particle[c], contact.solid[c]
         restitution.rebound[c] = 0.0
         share = max(float(restitution.particle[k]), restitution.solid[s])
@@ -51,7 +51,7 @@ def bounce(particles, contact, restitution):
     """Give what hit the displacement that it leaves with, by moving its previous position along the normal."""
     if restitution is None:
         return
-    for c in range(contact.count[0]):
+    for c in range(contact.listed[0]):
         if restitution.rebound[c] > 0.0 and contact.push[c] > 0.0:
             k, excess = contact.particle[c], approach(particles.position, contact, c) - restitution.rebound[c]
             contact.push[c] -= excess

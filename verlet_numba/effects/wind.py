@@ -19,8 +19,8 @@ def blow_runs(position, previous, acceleration, h, wind):
     u, v, w = previous[0], previous[1], previous[2]
     a, b, c = acceleration[0], acceleration[1], acceleration[2]
     zero, per = position.dtype.type(0), position.dtype.type(1.0 / (3.0 * h))
-    for r in range(wind.count.size):
-        i, j, k, n, d = wind.first[0, r], wind.first[1, r], wind.first[2, r], wind.count[r], wind.data[r]
+    for r in range(wind.lanes.size):
+        i, j, k, n, d = wind.first[0, r], wind.first[1, r], wind.first[2, r], wind.lanes[r], wind.data[r]
         xi, yi, zi, ui, vi, wi = x[i:i + n], y[i:i + n], z[i:i + n], u[i:i + n], v[i:i + n], w[i:i + n]
         xj, yj, zj, uj, vj, wj = x[j:j + n], y[j:j + n], z[j:j + n], u[j:j + n], v[j:j + n], w[j:j + n]
         xk, yk, zk, uk, vk, wk = x[k:k + n], y[k:k + n], z[k:k + n], u[k:k + n], v[k:k + n], w[k:k + n]

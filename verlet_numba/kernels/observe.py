@@ -5,10 +5,20 @@ import math
 import numpy as np
 
 from verlet_numba._jit import kernel
+from verlet_numba.buffers import (
+    ANGULAR,
+    CENTRE,
+    CONTACTS,
+    ERROR_MAX,
+    ERROR_RMS,
+    KINETIC,
+    MOMENTUM,
+    POTENTIAL,
+    RELAXATIONS,
+    SPEED_MAX,
+    TOTAL,
+)
 
-KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9
-ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
-COLUMNS = 20
 FAR = 1e30
 
 

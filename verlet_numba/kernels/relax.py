@@ -30,8 +30,8 @@ def relax_runs(position, runs, softness, tolerance, approximate):
         return relax_tolerant_runs(position, runs, tolerance, approximate)
     x, y, z = position[0], position[1], position[2]
     tiny = np.finfo(position.dtype).tiny
-    for r in range(runs.count.size):
-        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.count[r], runs.data[r]
+    for r in range(runs.lanes.size):
+        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.lanes[r], runs.data[r]
         xi, yi, zi, xj, yj, zj = x[i:i + n], y[i:i + n], z[i:i + n], x[j:j + n], y[j:j + n], z[j:j + n]
         rest, gi, gj = runs.rest[d:d + n], runs.weight[0, d:d + n], runs.weight[1, d:d + n]
         for k in range(n):
@@ -54,8 +54,8 @@ def relax_tolerant_runs(position, runs, tolerance, approximate):
     zero, slack = position.dtype.type(0), position.dtype.type(tolerance)
     tiny = np.finfo(position.dtype).tiny
     relaxed = 0
-    for r in range(runs.count.size):
-        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.count[r], runs.data[r]
+    for r in range(runs.lanes.size):
+        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.lanes[r], runs.data[r]
         xi, yi, zi, xj, yj, zj = x[i:i + n], y[i:i + n], z[i:i + n], x[j:j + n], y[j:j + n], z[j:j + n]
         rest, gi, gj = runs.rest[d:d + n], runs.weight[0, d:d + n], runs.weight[1, d:d + n]
         for k in range(n):
@@ -86,8 +86,8 @@ def relax_soft_runs(position, runs, softness, tolerance, approximate):
     zero, slack = position.dtype.type(0), position.dtype.type(slack_of(tolerance))
     tiny = np.finfo(position.dtype).tiny
     relaxed = 0
-    for r in range(runs.count.size):
-        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.count[r], runs.data[r]
+    for r in range(runs.lanes.size):
+        i, j, n, d = runs.first[0, r], runs.first[1, r], runs.lanes[r], runs.data[r]
         xi, yi, zi, xj, yj, zj = x[i:i + n], y[i:i + n], z[i:i + n], x[j:j + n], y[j:j + n], z[j:j + n]
         rest, gi, gj = runs.rest[d:d + n], runs.weight[0, d:d + n], runs.weight[1, d:d + n]
         share, given = softness.share[d:d + n], softness.given[d:d + n]

@@ -7,7 +7,11 @@ import math
 
 from verlet_numba._jit import formula
 
-PLANE, BOX, SPHERE, CYLINDER = 0, 1, 2, 3
+
+@formula
+def plane(x, y, z, nx, ny, nz, offset):
+    """Half space below the plane n . x = offset, n a unit vector."""
+    return nx * x + ny * y + nz * z - offset, nx, ny, nz
 
 
 @formula
@@ -49,15 +53,3 @@ def cylinder(x, y, z, radius, half):
     o, oz = max(q, 0.0), max(qz, 0.0)
     length = math.sqrt(o * o + oz * oz)
     return length, ux * o / length, uy * o / length, sz * oz / length
-
-
-@formula
-def surface(kind, x, y, z, e0, e1, e2, e3):
-    """Distance and normal of a solid of this kind and extent (buffers.Solids.extent)."""
-    if kind == PLANE:
-        return e0 * x + e1 * y + e2 * z - e3, e0, e1, e2
-    if kind == BOX:
-        return box(x, y, z, e0, e1, e2)
-    if kind == SPHERE:
-        return sphere(x, y, z, e0)
-    return cylinder(x, y, z, e0, e1)

@@ -23,6 +23,7 @@ FORMAT = 1                          # version of the file format
 LIBVER = ("earliest", "v110")
 CHUNK_BYTES = 65536                 # small frames share a chunk of about this size
 CHUNK_FRAMES = 64
+CHUNK_ROWS = 512                    # of time, step and observables
 PIECE_BYTES = 4 << 20               # a frame above this size is cut into pieces
 UNITS = {"position": "m", "velocity": "m s-1"}
 
@@ -84,7 +85,7 @@ def chunk_shape(particles: int, dtype: str, planned_frames: int) -> tuple[int, i
 def create_layout(file: h5py.File, contents: Contents, planned_frames: int) -> None:
     """Create every group and dataset of a trajectory, with no frame in it."""
     sources = _create_trajectory(file, contents, planned_frames)
-    _create_observables(file, contents.observables)
+    _create_observables(file, contents.observables, planned_frames)
     _create_constraints(file.create_group("connectivity/distance"), contents)
     _create_bodies(file.create_group("bodies"), contents.bodies)
     _create_provenance(file.create_group("provenance"), contents.provenance)
@@ -112,10 +113,11 @@ def _create_trajectory(file: h5py.File, contents: Contents, planned_frames: int)
     group = file.create_group("particles/trajectory")
     box = group.create_group("box")
     box.attrs["dimension"], box.attrs["boundary"] = 3, np.array([b"none"] * 3)
-    time = group.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(512,))
+    rows = min(CHUNK_ROWS, planned_frames)
+    time = group.create_dataset("time", (0,), np.float64, maxshape=(None,), chunks=(rows,))
     time.make_scale("time")
     time.attrs["units"] = "s"
-    step = group.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(512,))
+    step = group.create_dataset("step", (0,), np.int64, maxshape=(None,), chunks=(rows,))
     group["spatial"] = np.array(list("xyz"), "S1")
     group["spatial"].make_scale("spatial")
     particle = _scale(group, "particle", contents.particles)
@@ -133,16 +135,19 @@ def _create_trajectory(file: h5py.File, contents: Contents, planned_frames: int)
     return values
 
 
-def _create_observables(file: h5py.File, observables: dict[str, Quantity]) -> None:
+def _create_observables(file: h5py.File, observables: dict[str, Quantity], planned_frames: int) -> None:
     trajectory = file["particles/trajectory"]
     group = file.create_group("observables")
     for name, quantity in observables.items():
         element = group.create_group(name)
         tail = () if quantity.width == 1 else (quantity.width,)
-        value = element.create_dataset("value", (0, *tail), quantity.dtype, maxshape=(None, *tail), chunks=(512, *tail))
+        value = element.create_dataset("value", (0, *tail), quantity.dtype, maxshape=(None, *tail),
+                                       chunks=(min(CHUNK_ROWS, planned_frames), *tail))
         value.attrs["units"] = quantity.units
-        element["time"], element["step"] = trajectory["time"], trajectory["step"]
-        _attach(value, *(trajectory[scale] for scale in ("time", "spatial")[:value.ndim]))
+        scales = ("time", "spatial")[:value.ndim]
+        for link in ("step", *scales):      # xarray looks for a group's scales in the group
+            element[link] = trajectory[link]
+        _attach(value, *(trajectory[scale] for scale in scales))
 
 
 def _create_constraints(group: h5py.Group, contents: Contents) -> None:

@@ -6,7 +6,7 @@ where no reader looks; what changes in place is held back until all of the new s
 and go from low to high addresses: the superblock first, and the root of an index before its branches.
 
 A write that fails (disk full, size limit, quota) is therefore harmless: the committed part is untouched. HDF5 is not
-told, since it cannot close a file after a failed write without risk of a crash; it goes on in memory, and `check` raises.
+told, since closing a file after a failed write can crash it; it goes on in memory, and `check` raises.
 """
 
 import os

@@ -91,8 +91,10 @@ class TrajectoryFile:
     """
 
     def __init__(self, path: str | Path, contents: Contents, planned_frames: int, overwrite: bool = False,
-                 resume_at: int | None = None) -> None:
-        """`resume_at`: go on with the existing file; the first frame appended is this one, what it has already is kept.
+                 resume_at: int | None = None, beside: bool = True) -> None:
+        """`beside`: write while the caller goes on, instead of waiting for each block.
+
+        `resume_at`: go on with the existing file; the first frame appended is this one, what it has already is kept.
 
         Raises FileExistsError if `path` exists (without `overwrite` and `resume_at`), another OSError if its folder
         cannot be written to, ValueError if the file to go on with has fewer than `resume_at` frames or other particles.
@@ -100,6 +102,7 @@ class TrajectoryFile:
         self.path = Path(path)
         self.frames = 0                             # committed
         self._contents, self._overwrite = contents, overwrite
+        self._most_under_way = UNDER_WAY if beside else 0
         self._named = resume_at is not None
         self._refuse_to_overwrite()
         self._disk = self._open_disk()
@@ -123,15 +126,17 @@ class TrajectoryFile:
         Returns while they are being written. Raises OSError if an earlier block could not be written, with the frames
         up to the last commit intact; nothing can be appended after that. Raises ValueError beyond the planned frames.
         """
-        rows = {"particles/trajectory/time": np.array(time, np.float64), "VTKHDF/Steps/Values": np.array(time, np.float64),
-                "particles/trajectory/step": np.array(step, np.int64)}
+        rows = dict.fromkeys(("particles/trajectory/time", "VTKHDF/Steps/Values"), np.array(time, np.float64))
+        rows["particles/trajectory/step"] = np.array(step, np.int64)
         rows |= {f"observables/{name}/value": np.array(observables[name]) for name in self._contents.observables}
         block = _Block(rows, {name: np.array(fields[name], self._contents.dtype, order="C") for name in self._fields})
         self._appended += len(block)
         if self._appended > self._planned:
             raise ValueError(f"{self.path}: frame {self._appended - 1} is beyond the {self._planned} planned")
-        self._wait(UNDER_WAY - 1)
+        self._wait(max(0, self._most_under_way - 1))
         self._under_way.append(self._thread.submit(self._write, block))
+        if not self._most_under_way:
+            self._wait(0)
 
     def flush(self) -> None:
         """Commit every frame appended so far. Raises OSError as `append` does."""
@@ -159,7 +164,8 @@ class TrajectoryFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
         self.close()
 
     @property
@@ -184,7 +190,7 @@ class TrajectoryFile:
     def _attach(self) -> None:
         group = self._file["particles/trajectory"]
         self._fields = {name: _Chunked(group[name]["value"]) for name in self._contents.fields}
-        self._chunk_frames = self._fields["position"].chunk[0]
+        self._chunk_frames = int(self._fields["position"].chunk[0])
         paths = ["particles/trajectory/time", "particles/trajectory/step", "VTKHDF/Steps/Values"]
         paths += [f"observables/{name}/value" for name in self._contents.observables]
         self._rows = {path: _Rows(self._file[path]) for path in paths}

@@ -38,7 +38,8 @@ def create_vtkhdf(file: h5py.File, cells: dict[str, Sequence[Integers] | Integer
         _create_cells(root.create_group(kind), cells.get(kind, ()))
     root.create_group("PointData")
     write_static(root.create_group("CellData"), "body", cell_body.astype(np.int32))
-    _create_steps(root.create_group("Steps"), particles, planned_frames, [name for name in sources if name != "position"])
+    point_data = [name for name in sources if name != "position"]
+    _create_steps(root.create_group("Steps"), particles, planned_frames, point_data)
     for name, source in sources.items():
         _create_virtual(root, "Points" if name == "position" else f"PointData/{name}", source, planned_frames)
 
@@ -65,7 +66,7 @@ def _create_steps(steps: h5py.Group, particles: int, planned_frames: int, point_
     for name in point_data:
         steps["PointDataOffsets"][name] = offsets
     # Its own dataset: with a hard link to the particles' time, h5netcdf would take its name for the dimension's.
-    steps.create_dataset("Values", (0,), np.float64, maxshape=(None,), chunks=(512,))
+    steps.create_dataset("Values", (0,), np.float64, maxshape=(None,), chunks=(min(512, planned_frames),))
 
 
 def _create_virtual(root: h5py.Group, name: str, source: h5py.Dataset, planned_frames: int) -> None:

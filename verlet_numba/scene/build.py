@@ -1,16 +1,26 @@
-"""A scene's bodies become the world that the frame loop advances."""
+"""A scene's bodies become the world that the frame loop advances. Nothing here needs Numba."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import Array, Effects, Frames, Observed, Particles, Snapshot, Solver, World, gate
-from verlet_numba.frame import FULL, SUBSTEP, accelerate, advance
-from verlet_numba.kernels.observe import COLUMNS
+from verlet_numba.buffers import (
+    COLUMNS,
+    SUBSTEP,
+    Array,
+    Effects,
+    Frames,
+    Observed,
+    Particles,
+    Snapshot,
+    Solver,
+    World,
+    gate,
+)
 from verlet_numba.scene import forces
 from verlet_numba.scene.body import Body, Floats, Integers
-from verlet_numba.scene.colliders import carried, contact_of, room, spread
+from verlet_numba.scene.colliders import carried, contact_of, spread
 from verlet_numba.scene.constraints import constraints
 from verlet_numba.scene.numbering import Numbering, number, padded
 from verlet_numba.scene.schema import Scene
@@ -32,7 +42,7 @@ class Model:
 
 
 def build(scene: Scene, bodies: list[Body]) -> Model:
-    """Number the particles, lay out the constraints and start Verlet's recursion."""
+    """Number the particles and lay out everything that the scene calls for. The particles have no place yet."""
     real = np.dtype(scene.solver.precision)
     numbering = number(bodies)
     size = padded(numbering.size, real.itemsize)
@@ -50,7 +60,6 @@ def build(scene: Scene, bodies: list[Body]) -> Model:
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
     world = World(particles, *joined, effects, solver, observed, snapshot, clock)
-    start(world, numbering, bodies)
     return Model(scene, bodies, numbering, world)
 
 
@@ -93,43 +102,8 @@ def attachments(scene: Scene, bodies: list[Body], numbering: Numbering) -> Integ
     return np.array(rows, np.int64).reshape(-1, 2)
 
 
-def start(world: World, numbering: Numbering, bodies: list[Body]) -> None:
-    """Positions and the previous positions x0 - v0 h + a0 h^2/2: exact for constant acceleration.
-
-    x0 - v0 h alone would put an error of -g h t/2 into free fall.
-    """
-    particles, h = world.particles, world.solver.step
-    position, velocity = (np.zeros(particles.position.shape) for _ in range(2))
-    for body, index in zip(bodies, numbering.bodies, strict=True):
-        position[:, index] = np.moveaxis(body.positions, 2, 0)
-        velocity[:, index] = np.where(body.pinned, 0.0, np.moveaxis(body.velocities, 2, 0))
-    particles.position[:] = position
-    particles.previous[:] = position - velocity * h
-    if particles.acceleration is not None:
-        accelerate(particles, world.effects, h)
-        particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
-
-
 def frames(model: Model, count: int) -> Frames:
     """Room for a chunk of frames."""
     output, shape = model.scene.output, (count, model.particles, 3)
     velocity: Array | None = np.empty(shape, output.precision) if "velocity" in output.fields else None
     return Frames(np.empty(shape, output.precision), velocity, np.empty((count, COLUMNS)))
-
-
-def grown(world: World) -> World:
-    """The same world with room for twice the contacts; those listed so far are found again."""
-    effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
-    assert contact is not None
-    capacity = 2 * contact.particle.size
-    contact = contact._replace(**dict(zip(("particle", "solid", "normal", "bound", "anchor", "push"), room(capacity), strict=True)))
-    if restitution is not None:
-        restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
-    return world._replace(effects=effects._replace(contact=contact, restitution=restitution))
-
-
-def run_chunk(model: Model, chunk: Frames) -> int:
-    """Advance by a chunk of frames from the clock's frame 0, growing what is full. Returns OK or DIVERGED."""
-    while (status := advance(model.world, chunk)) == FULL:
-        model.world = grown(model.world)
-    return int(status)

@@ -4,8 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Solids, gate
-from verlet_numba.physics.solids import BOX, CYLINDER, PLANE, SPHERE
+from verlet_numba.buffers import BOX, CYLINDER, PLANE, SPHERE, Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Solids, gate
 from verlet_numba.scene.body import Body, Floats
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.schema import Scene

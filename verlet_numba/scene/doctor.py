@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from verlet_numba.scene.body import Body
-from verlet_numba.scene.clearance import clearance
+from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.clearance import Surface, clearance
 from verlet_numba.scene.occupied import load_surfaces
 from verlet_numba.scene.overlap import overlaps
 from verlet_numba.scene.problems import Path as Key
@@ -21,19 +22,185 @@ Warnings = Iterator[tuple[Key, str]]
 TOUCH = 1e-6            # of a body's size: overlap up to this is touching
 STRETCH = 0.01          # relative length error at the start that is worth a word
 MASS_RATIO = 100.0      # of particles joined to each other, above which few passes leave visible stretch
-RESOLVED = 1e-3         # of the smallest stick: coarser spacing of numbers than this spoils its length
+RESOLVED = 1e-3         # of the shortest stick: numbers further apart than this spoil its length
 
 
 def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> list[Problem]:
-    """Warnings about a scene and its placed bodies, with positions in the file, in the order of the checks below."""
-    surfaces, unread = load_surfaces(scene, folder, source)
-    found = [*_bracing(scene, bodies), *_sticks(scene, bodies), *_attachments(scene, bodies)]
+    """Warnings about a scene and its placed bodies (`place`), each with its position in the file."""
+    surfaces, _ = load_surfaces(scene, folder, source)
+    found = [*bracing(bodies), *sticks(bodies, scene.solver.order), *attachments(scene, bodies)]
     if scene.effects.contact != "none":
-        for index, collider in enumerate(scene.colliders):
-            if collider.kind != "mesh" or index in surfaces:
-                found += _inside(collider, scene, bodies, lambda points, c=collider, s=surfaces.get(index):
-                                 clearance(c, points, s))
-            found += _too_fast(collider, scene, bodies)
-        found += [*overlaps(scene, bodies), *_not_simulated(scene, bodies)]
-    found += _precision(scene, bodies)
-    return unread + [source.problem(path, message) for path, message in found]
+        found += [*inside_colliders(scene, bodies, surfaces), *too_fast(scene, bodies),
+                  *overlaps(scene, bodies), *not_simulated(bodies)]
+    found += [*resolution(scene, bodies), *lost_gravity(scene, bodies)]
+    return [source.problem(path, message) for path, message in found]
+
+
+def bracing(bodies: list[Body]) -> Warnings:
+    """Meshes whose tetrahedralisation left them floppy."""
+    for index, body in enumerate(bodies):
+        if body.shape.kind == "mesh":
+            from verlet_numba.scene.mesh import tetrahedral_sticks
+
+            added = len(body.shape.sticks) - len(tetrahedral_sticks(body.shape.positions, body.shape.triangles))
+            if added:
+                yield ("bodies", index, "file"), (f"the rank of the rigidity matrix falls short: the body is braced "
+                                                  f"by {added} sticks through its inside")
+
+
+def sticks(bodies: list[Body], order: str) -> Warnings:
+    """Sticks given one by one: repeated, without direction, far from their length, or between unequal masses."""
+    for index, body in enumerate(bodies):
+        shape = body.shape
+        if shape.kind != "particles" or not len(shape.sticks):
+            continue
+        path = ("bodies", index, "sticks")
+        earlier = _earlier(shape.sticks)
+        for row, others in _first(earlier >= 0):
+            yield (*path, row), f"joins the same particles as stick {earlier[row]}{others}"
+        distance = stick_lengths(body.positions[0], shape.sticks)
+        for row, others in _first(distance == 0):
+            yield (*path, row), f"its particles start at the same point, so it has no direction{others}"
+        off = np.abs(distance - shape.lengths) > STRETCH * shape.lengths
+        for row, others in _first(off & (distance > 0)):
+            yield (*path, row), (f"starts {distance[row]:.4g} m long, but its length is {shape.lengths[row]:.4g} m: "
+                                 f"the first steps pull it there with a jerk{others}")
+        ratio = _mass_ratio(body, shape.sticks)
+        for row, others in _first(ratio > MASS_RATIO) if order != "lines" else ():
+            yield (*path, row), (f"joins masses of {ratio[row]:.3g}:1, which few passes leave stretched: use more "
+                                 f"substeps or solver.order lines{others}")
+
+
+def _first(wrong: NDArray[np.bool_]) -> Iterator[tuple[int, str]]:
+    """The first row that is wrong, if any, and words for how many others are."""
+    rows = np.flatnonzero(wrong)
+    if len(rows):
+        yield int(rows[0]), f" (and {len(rows) - 1} more sticks)" if len(rows) > 1 else ""
+
+
+def _earlier(pairs: Integers) -> Integers:
+    """For each pair the row of an earlier one with the same two numbers, -1 if there is none."""
+    _, first, inverse = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True, return_inverse=True)
+    earlier = first[inverse.ravel()]
+    return np.where(earlier == np.arange(len(pairs)), -1, earlier)
+
+
+def _mass_ratio(body: Body, pairs: Integers) -> Floats:
+    """The heavier mass of each pair over the lighter one; 1 where one of them is held."""
+    masses = body.shape.masses[pairs]
+    held = body.pinned[pairs].any(axis=1)
+    return np.where(held, 1.0, masses.max(axis=1) / masses.min(axis=1))
+
+
+def attachments(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Particles that are to stay together but start apart, are both held, or have very unequal masses."""
+    named = {body.name: body for body in bodies}
+    for row, (a, i, b, j) in enumerate(scene.attachments):
+        path = ("attachments", row)
+        ends = [(named[name], number) for name, number in ((a, i), (b, j))]
+        points = [body.positions.reshape(-1, 3)[number] for body, number in ends]
+        masses = [body.shape.masses[number % len(body.pinned)] for body, number in ends]
+        held = [bool(body.pinned[number % len(body.pinned)]) for body, number in ends]
+        apart = float(np.linalg.norm(points[1] - points[0]))
+        if apart > TOUCH * max(_size(body) for body, _ in ends):
+            yield path, f"the two particles start {apart:.4g} m apart: the first step pulls them together with a jerk"
+        if all(held):
+            yield path, "both particles are pinned, so it does nothing"
+        elif not any(held) and max(masses) > MASS_RATIO * min(masses):
+            yield path, (f"joins masses of {max(masses) / min(masses):.3g}:1, which few passes leave apart: use more "
+                         "substeps")
+
+
+def inside_colliders(scene: Scene, bodies: list[Body], surfaces: dict[int, Surface]) -> Warnings:
+    """Free particles that start inside a collider, their radius counted. Scattered copies are clear of all."""
+    for index, body in enumerate(bodies):
+        free = body.positions[0][~body.pinned]
+        if scene.bodies[index].scatter or not len(free):
+            continue
+        for collider, surface in _with_surfaces(scene, surfaces):
+            depth = body.shape.radius - clearance(collider, free, surface)
+            deep = depth > TOUCH * _size(body)
+            if deep.any():
+                yield ("bodies", index), (f"{deep.sum()} of its {len(body.pinned)} particles start inside collider "
+                                          f"{collider.name}, up to {depth.max():.3g} m deep")
+
+
+def _with_surfaces(scene: Scene, surfaces: dict[int, Surface]) -> Iterator[tuple[Collider, Surface | None]]:
+    return ((collider, surfaces.get(index)) for index, collider in enumerate(scene.colliders))
+
+
+def too_fast(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Particles whose first substep takes them further than a collider is thick: they may never be found inside."""
+    step = _step(scene)
+    thin = [(collider, *_thickness(collider)) for collider in scene.colliders if collider.kind in _THICKNESS]
+    for index, body in enumerate(bodies):
+        speed = float(np.linalg.norm(body.velocities, axis=2).max(initial=0))
+        for collider, thickness, own_speed in thin:
+            reach, limit = (speed + own_speed) * step, thickness + 2 * body.shape.radius
+            if reach > limit:
+                needed = int(np.ceil(scene.solver.substeps * reach / limit))
+                yield ("bodies", index), (
+                    f"moves up to {reach:.3g} m a substep, more than collider {collider.name} and its own thickness "
+                    f"({limit:.3g} m): it may pass through; use {needed} substeps")
+                break
+
+
+_THICKNESS = {
+    "box": lambda collider: min(collider.size),
+    "sphere": lambda collider: 2 * collider.radius,
+    "cylinder": lambda collider: min(2 * collider.radius, collider.length),
+}
+
+
+def _thickness(collider: Collider) -> tuple[float, float]:
+    """The least thickness of a finite collider (m), and the greatest speed along its path (m/s)."""
+    knots = np.array(collider.path or [(0, 0, 0, 0)], float)
+    steps = np.diff(knots, axis=0)
+    speeds = np.linalg.norm(steps[:, 1:], axis=1) / steps[:, 0]
+    return _THICKNESS[collider.kind](collider), float(speeds.max(initial=0))
+
+
+def not_simulated(bodies: list[Body]) -> Warnings:
+    """Bodies that would pass through each other."""
+    if sum(body.copies for body in bodies) > 1 and not all(body.pinned.all() for body in bodies):
+        yield ("bodies",), ("contact of bodies with each other is not simulated yet: they pass through each other "
+                            "(contact with colliders is)")
+
+
+def resolution(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Coordinates so large that float32, in the solver or in the file, cannot tell neighbouring particles apart."""
+    lengths = [float(body.shape.lengths.min()) for body in bodies if len(body.shape.lengths)]
+    spacing = _float32_spacing(bodies)
+    if not lengths or spacing <= RESOLVED * min(lengths):
+        return
+    for key, precision in (("solver", scene.solver.precision), ("output", scene.output.precision)):
+        if precision == "float32":
+            yield (key, "precision"), (f"float32 tells coordinates of this size apart by {spacing:.2g} m, too coarse "
+                                       f"for sticks of {min(lengths):.3g} m: use float64 or move the scene towards "
+                                       "the origin")
+
+
+def lost_gravity(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Substeps so short that the displacement g h^2 of one is lost when it is added to a float32 coordinate."""
+    if scene.solver.precision != "float32" or scene.effects.gravity is None:
+        return
+    fall = float(np.linalg.norm(scene.effects.gravity)) * _step(scene)**2
+    spacing = _float32_spacing(bodies)
+    if 0 < fall < spacing:
+        yield ("solver", "precision"), (f"gravity moves a particle by {fall:.2g} m a substep, less than float32 "
+                                        f"resolves here ({spacing:.2g} m): use float64 or fewer substeps")
+
+
+def _float32_spacing(bodies: list[Body]) -> float:
+    """Distance (m) between neighbouring float32 numbers at the largest coordinate of the scene."""
+    largest = max((float(np.abs(body.positions).max()) for body in bodies), default=0.0)
+    return float(np.spacing(np.float32(largest)))
+
+
+def _step(scene: Scene) -> float:
+    return 1 / (scene.time.frame_rate * scene.solver.substeps)
+
+
+def _size(body: Body) -> float:
+    """Largest extent (m) of one copy."""
+    return float(np.ptp(body.positions[0], axis=0).max()) + 2 * body.shape.radius

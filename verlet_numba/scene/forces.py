@@ -9,7 +9,7 @@ from verlet_numba.scene.body import Body, Floats
 from verlet_numba.scene.constraints import per_copy
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.runs import joined, lanes
-from verlet_numba.scene.schema import Effects
+from verlet_numba.scene.schema_effects import Effects
 
 
 def lanes_of(vector: tuple[float, float, float], moves: Any, real: Any) -> Any:

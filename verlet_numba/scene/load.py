@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from pydantic import ValidationError
 
 from . import messages, relations
 from .overrides import override
-from .problems import Problem, SceneError
+from .problems import MAX_PROBLEMS, Problem, SceneError
 from .schema import Scene
 from .source import Source, compose, read
 
@@ -41,18 +42,18 @@ def loads(text: str, name: str, sets: Sequence[str] = ()) -> Loaded:
     try:
         scene = Scene.model_validate(source.data)
     except ValidationError as error:
-        problems += messages.problems(error, source)
-    problems += (source.problem(path, message) for path, message in relations.findings(source.data))
+        problems += islice(messages.problems(error, source), MAX_PROBLEMS)
+    problems += (source.problem(path, message) for path, message in relations.findings(source.data, scene))
     if problems or scene is None:
         raise SceneError(_in_order(problems, source))
     return Loaded(scene, source, Path(name).parent)
 
 
 def _in_order(problems: Sequence[Problem], source: Source) -> list[Problem]:
-    """In the order of the file, overrides last; of several at one place the first alone, which caused the others."""
-    first: dict[tuple[str, int, int], Problem] = {}
+    """In the order of the file, overrides last; of several about one value the first alone, which caused the others."""
+    first: dict[tuple[object, ...], Problem] = {}
     for problem in problems:
-        first.setdefault(problem[:3], problem)
+        first.setdefault(problem[:4], problem)
     return sorted(first.values(), key=lambda problem: (problem.file != source.name, problem[:3]))
 
 

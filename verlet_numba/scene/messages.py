@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from .problems import Path, Problem
+from .problems import Path, Problem, shown
 from .schema import Scene
 from .schema_bodies import BODIES
 from .schema_colliders import COLLIDERS
@@ -22,7 +22,6 @@ _WANTED = {
 _BOUNDS = {
     "greater_than": ("gt", "must be above"), "greater_than_equal": ("ge", "must be at least"),
     "less_than": ("lt", "must be below"), "less_than_equal": ("le", "must be at most")}
-_SILENT = "default_factory_not_called"        # follows from an error that is told
 
 
 def problems(error: ValidationError, source: Source) -> Iterator[Problem]:
@@ -30,14 +29,14 @@ def problems(error: ValidationError, source: Source) -> Iterator[Problem]:
     for line in error.errors(include_url=False):
         if line["type"] == "extra_forbidden":
             yield source.problem(_path(line["loc"]), _unknown(line["loc"]), key=True)
-        elif line["type"] != _SILENT:
+        elif not _follows(line):
             for path, message in _findings(line):
                 yield source.problem(path, message)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` (did you mean 'x'?)`, or nothing if no known word is near."""
-    near = get_close_matches(word, list(known), n=1, cutoff=0.6)
+    near = get_close_matches(word, list(known), n=1, cutoff=0.6) if len(word) <= 60 else []
     return f" (did you mean '{near[0]}'?)" if near else ""
 
 
@@ -46,8 +45,8 @@ def one_of(word: object, known: Iterable[str]) -> str:
     known = list(known)
     hint = did_you_mean(word, known) if isinstance(word, str) else ""
     if len(known) == 1:
-        return f"must be {known[0]}, not {_shown(word)}"
-    return f"{_shown(word)} is not one of {', '.join(known)}{hint}"
+        return f"must be {known[0]}, not {shown(word)}"
+    return f"{shown(word)} is not one of {', '.join(known)}{hint}"
 
 
 def _findings(line: Any) -> Iterator[Finding]:
@@ -71,15 +70,20 @@ def _unknown(where: Path) -> str:
     return "unknown key" + (did_you_mean(str(where[-1]), known) or f"; known here: {', '.join(known)}")
 
 
+def _follows(line: Any) -> bool:
+    """Whether an error only follows from another: a default of wrong values, a list short of its wrong entries."""
+    return line["type"] == "default_factory_not_called" or (line["type"] == "too_short" and bool(line["input"]))
+
+
 def _about(kind: str, value: Any, context: Mapping[str, Any], path: Path, fallback: str) -> str:
     """What is wrong with one value."""
     if value is None and kind in _WANTED:
         return f"nothing stands here, where {_WANTED[kind]} belongs; write it, or leave the key out"
     if kind in _WANTED:
-        return f"must be {_WANTED[kind]}, not {_shown(value)}"
+        return f"must be {_WANTED[kind]}, not {shown(value)}"
     if kind in _BOUNDS:
         key, words = _BOUNDS[kind]
-        return f"{words} {context[key]:.15g}, not {_shown(value)}{_instead(path, value)}"
+        return f"{words} {context[key]:.15g}, not {shown(value)}{_instead(path, value)}"
     if kind == "literal_error":
         return one_of(value, _quoted(context["expected"]) or [context["expected"]])
     if kind == "finite_number":
@@ -91,7 +95,7 @@ def _about(kind: str, value: Any, context: Mapping[str, Any], path: Path, fallba
     if kind == "string_too_long":
         return f"is longer than {context['max_length']} characters"
     if kind == "string_pattern_mismatch":
-        return f"{_shown(value)} cannot be a name: no dots, slashes, = or spaces, and not a mere number"
+        return f"{shown(value)} cannot be a name: no dots, slashes, = or spaces, and not a mere number"
     return fallback
 
 
@@ -141,16 +145,3 @@ def _keys(where: Path) -> list[str]:
 
 def _quoted(text: str) -> list[str]:
     return re.findall(r"'([^']*)'", text)
-
-
-def _shown(value: object) -> str:
-    """A value as it stands in YAML, in short."""
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return repr(value if len(value) <= 40 else value[:37] + "...")
-    if isinstance(value, int | float):
-        return f"{value:.15g}"
-    return "a list" if isinstance(value, list | tuple) else "a mapping"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from .messages import did_you_mean
-from .problems import Path, Problem, SceneError
+from .problems import Path, Problem, SceneError, dotted
 from .schema_common import entry_name
 from .source import MappingMarks, Marks, Override, Source, compose, pack
 
@@ -28,15 +28,18 @@ def override(source: Source, sets: Sequence[str]) -> tuple[Source, list[Problem]
 
 def _apply(source: Source, argument: str) -> tuple[Source, list[Problem]]:
     target, equals, text = argument.partition("=")
-    name = f"--set {argument}"
-    if not equals or not text.strip() or "" in target.split("."):
+    words = target.split(".")
+    name = f"--set {argument if argument.isprintable() else ascii(argument)}"
+    if not equals or not text.strip() or "" in words:
         raise SceneError([Problem(name, 1, 1, "", "write PATH=VALUE, such as solver.substeps=4")])
     value, problems = compose(text, name, column=len(target) + 1)
     steps, column = [], 0
-    for word in target.split("."):
+    for word in words:
         steps.append(_Step(word, column, name))
         column += len(word) + 1
     data, laid = _lay(source.data, steps, (), _Laid((), value.data, value.marks))
+    full = (*laid.path, *words[len(laid.path) :])
+    problems = [problem._replace(path=".".join(filter(None, (dotted(full), problem.path)))) for problem in problems]
     own = MappingMarks(0, {str(laid.path[-1]): pack(0, laid.column)}, {str(laid.path[-1]): laid.marks})
     placed = Override(laid.path, Source(name, argument, laid.data, own))
     return replace(source, data=data, overrides=(*source.overrides, placed)), problems

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from verlet_numba.scene import shapes
 from verlet_numba.scene.body import Body, Floats, Shape
-from verlet_numba.scene.clearance import Surface
 from verlet_numba.scene.occupied import Occupied, bounding_radius, centre_of_mass, load_surfaces, rotation_matrix
 from verlet_numba.scene.problems import Problem, SceneError
 from verlet_numba.scene.scatter import Free, NoRoomError, random_rotations, random_velocities, scatter
@@ -33,10 +32,8 @@ def place(scene: Scene, folder: Path, source: Source) -> list[Body]:
         except ShapeError as error:
             problems.append(source.problem(("bodies", index, error.key), str(error)))
     problems += _unknown_attached(scene, built, source)
-    surfaces: dict[int, Surface] = {}
-    if any(entry.scatter for entry in scene.bodies):
-        surfaces, unread = load_surfaces(scene, folder, source)
-        problems += unread
+    surfaces, unread = load_surfaces(scene, folder, source)
+    problems += unread
     if problems:
         raise SceneError(problems)
 

@@ -7,6 +7,10 @@ Path = tuple[str | int, ...]
 """Where a value stands in a document: keys of mappings and indices of lists, outermost first."""
 
 
+MAX_PROBLEMS = 1000
+"""As many are told at once; a file with more is no scene."""
+
+
 class Problem(NamedTuple):
     """One finding. `line` and `column` count from 1; `path` is dotted, as `--set` takes it, empty for all of it."""
 
@@ -31,4 +35,18 @@ class SceneError(ValueError):
 
 def dotted(path: Path) -> str:
     """The path as users write it: `bodies.0.mass`."""
-    return ".".join(map(str, path))
+    return ".".join(step if isinstance(step, str) and step.isprintable() and len(step) <= 60 else shown(step)
+                    for step in path)
+
+
+def shown(value: object) -> str:
+    """A value as it stands in YAML, in short and on one line."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return ascii(value if len(value) <= 40 else value[:37] + "...")
+    if isinstance(value, int | float):
+        return f"{value:.15g}"
+    return "a list" if isinstance(value, list | tuple) else "a mapping"

@@ -9,7 +9,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from .messages import did_you_mean
-from .schema import Solver, Time
+from .problems import shown
+from .schema import Scene, Solver, Time
 from .schema_bodies import BODIES, BaseBody
 from .schema_common import Finding, entry_name
 
@@ -17,11 +18,14 @@ MAX_TOTAL = 100_000_000        # particles of a scene
 MIN_STEP = 1e-9                # s
 
 
-def findings(data: Mapping[str, Any]) -> Iterator[Finding]:
-    """What is wrong between parts of a scene that are each right; wrong parts are passed over."""
+def findings(data: Mapping[str, Any], scene: Scene | None) -> Iterator[Finding]:
+    """What is wrong between parts of a scene that are each right; wrong parts are passed over.
+
+    `scene` is what the document was validated to, None if it could not be.
+    """
     bodies, colliders = _entries(data, "bodies"), _entries(data, "colliders")
     names = [entry_name(body, index) for index, body in enumerate(bodies)]
-    valid = [_valid(body) for body in bodies]
+    valid = scene.bodies if scene else [_valid(body) for body in bodies]
     yield from _repeated("bodies", bodies, names)
     yield from _repeated("colliders", colliders, [entry_name(entry, index) for index, entry in enumerate(colliders)])
     yield from _attachments(_entries(data, "attachments"), dict(zip(names, valid, strict=True)))
@@ -54,7 +58,7 @@ def _repeated(key: str, entries: Sequence[Any], names: Sequence[str | None]) -> 
     for index, name in enumerate(names):
         if name is not None and first.setdefault(name, index) != index:
             path = (key, index, "name") if "name" in entries[index] else (key, index)
-            yield path, f"the name '{name}' is that of {key}.{first[name]} already; give each its own"
+            yield path, f"the name {shown(name)} is that of {key}.{first[name]} already; give each its own"
 
 
 def _attachments(rows: Sequence[Any], bodies: Mapping[str | None, BaseBody | None]) -> Iterator[Finding]:
@@ -70,15 +74,16 @@ def _attachments(rows: Sequence[Any], bodies: Mapping[str | None, BaseBody | Non
                 continue
             body = bodies[name]
             if body is not None and body.particles is not None and number >= body.particles * body.count:
+                count = body.particles * body.count
                 yield (("attachments", row, end + 1),
-                       f"there is no particle {number:g}: '{name}' has {body.particles * body.count}, numbered from 0")
+                       f"there is no particle {number:g}: {shown(name)} has {count}, numbered from 0")
         if entry[:2] == entry[2:]:
             yield ("attachments", row), "attaches a particle to itself"
 
 
 def _no_body(name: str, names: Any) -> str:
     known = [known for known in names if known is not None]
-    return f"there is no body named '{name}'" + (
+    return f"there is no body named {shown(name)}" + (
         did_you_mean(name, known) or f"; there are {', '.join(known[:10]) or 'no bodies'}")
 
 

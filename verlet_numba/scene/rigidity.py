@@ -34,7 +34,7 @@ def full_rank(positions: Floats) -> int:
     That is 3 P - 6 for a solid body. Points in a plane or on a line reach 2 P - 3 or P - 1: to first order no stick
     resists bending out of them.
     """
-    d = _numerical_rank(positions - positions.mean(axis=0)) if len(positions) else 0
+    d = _numerical_rank(positions - positions[0]) if len(positions) else 0
     return d * len(positions) - d * (d + 1) // 2
 
 

@@ -38,7 +38,7 @@ def scatter(count: int, radius: float, inside: ArrayLike, free: Free, rng: np.ra
     lattice = lattice[free(lattice)]
     if len(lattice) < count:
         raise NoRoomError(max(len(centres), len(lattice)))
-    return np.asarray(lattice[rng.choice(len(lattice), count, replace=False)])
+    return np.asarray(lattice[:count])
 
 
 def _place_in_turn(count: int, radius: float, lower: Floats, upper: Floats, free: Free,
@@ -69,12 +69,15 @@ def _place_in_turn(count: int, radius: float, lower: Floats, upper: Floats, free
 
 
 def _jittered_lattice(count: int, radius: float, lower: Floats, upper: Floats, rng: np.random.Generator) -> Floats:
-    """One centre in each cell of a lattice whose cells hold a sphere, moved at random within its cell."""
-    enough = 100 * count + 1000                     # cells along a side, where a finer lattice could not be needed
-    cells = np.clip(np.floor((upper - lower) / (2 * radius) * (1 + 1e-12)), 1, round(enough ** (1 / 3)) + 1)
-    cells = np.where(cells.prod() < enough, np.floor((upper - lower) / (2 * radius) * (1 + 1e-12)).clip(1), cells)
+    """Centres in cells of a lattice that hold a sphere each, moved at random within the cell; cells in random order.
+
+    All cells, or 20 a copy if there are more.
+    """
+    cells = np.clip(np.floor((upper - lower) / (2 * radius) * (1 + 1e-12)), 1, 1e6).astype(np.int64)
+    total = int(cells.prod())
+    chosen = rng.choice(total, min(total, 20 * count + 1000), replace=False)
+    corners = np.stack(np.unravel_index(chosen, cells), axis=1)
     pitch = (upper - lower) / cells
-    corners = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, 3)
     play = np.maximum(pitch / 2 - radius, 0)
     return np.asarray(lower + (corners + 0.5) * pitch + rng.uniform(-1, 1, corners.shape) * play)
 

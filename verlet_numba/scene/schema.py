@@ -129,7 +129,7 @@ Attachment = tuple[Name, Whole, Name, Whole]
 class Scene(Part):
     """A scene of verlet-numba: SI units, z up."""
 
-    version: Literal[1] = Field(description="of this format")
+    version: Literal[1] = Field(description="version of the format of scene files: 1")
     name: Annotated[str, Field(max_length=1000)] = Field(default="scene", description="title")
     time: Time = Field(description="duration and frame rate")
     seed: Whole = Field(default=0, description="of everything random")

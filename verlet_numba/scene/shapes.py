@@ -176,7 +176,7 @@ def icosahedron(radius: float, *, mass: float | None = None, density: float | No
     """Twelve particles at distance `radius` (m) from the origin; 30 edges and 6 diagonals are sticks."""
     unit, triangles, sticks = _icosahedron_template()
     positions = unit * radius
-    side = radius / (2 * sin(2 * pi / 5))
+    side = radius / sin(2 * pi / 5)
     volume = 5 * (3 + sqrt(5)) / 12 * side**3
     return Shape("icosahedron", ("points",), positions, share_mass(12, mass, density, volume),
                  sticks, stick_lengths(positions, sticks), rigid=True, triangles=triangles)

@@ -14,20 +14,20 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from .problems import Path, Problem, SceneError, dotted
+from .problems import MAX_PROBLEMS, Path, Problem, SceneError, dotted, shown
 
 MAX_BYTES = 16 * 1024 * 1024
 MAX_DEPTH = 32
-MAX_NODES = 2_000_000
+MAX_NODES = 1_000_000
+MAX_KEYS = 1000
 MAX_EXPANDED = 250_000
 """Values that aliases may add to those written out."""
 
-_NULL = re.compile(r"(?:null|Null|NULL|~|)\Z")
-_BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
-_INTEGER = re.compile(r"[-+]?[0-9]+\Z|0o[0-7]+\Z|0x[0-9a-fA-F]+\Z")
-_REAL = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
+_WORDS = {"": None, "~": None, "null": None, "Null": None, "NULL": None,
+          "true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_DECIMAL = re.compile(r"[-+]?(?:[0-9]+(\.[0-9]*)?|(\.[0-9]+))([eE][-+]?[0-9]+)?\Z")        # groups: what no integer has
+_BASED = re.compile(r"0(?:o[0-7]+|x[0-9a-fA-F]+)\Z")
 _NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)\Z|\.(?:nan|NaN|NAN)\Z")
-_PREFIXES = {"0o": 8, "0x": 16}
 
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -167,8 +167,8 @@ def compose(text: str, name: str, *, column: int = 0) -> tuple[Source, list[Prob
         raise composer.failure(position, f"not YAML: {error.reason}") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        position = composer.at(mark.line, mark.column) if mark else composer.at(0, 0)
-        raise composer.failure(position, _syntax(error)) from None
+        place = min((mark.line, mark.column), _end_of(text)) if mark else (0, 0)        # the end is never a new line
+        raise composer.failure(composer.at(*place), _syntax(error)) from None
     return Source(name, text, data, marks), composer.problems
 
 
@@ -182,8 +182,8 @@ def _syntax(error: yaml.MarkedYAMLError) -> str:
     message = f"not YAML: {error.problem or error.context or 'cannot be read'}"
     if error.context and error.context_mark:
         message += f" {error.context} that starts at line {error.context_mark.line + 1}"
-    if "cannot start any token" in message:
-        message += " (indent with spaces, not tabs; put quotes around text that starts with a special character)"
+    if "tab character" in message or "cannot start any token" in message:
+        message += "; indent with spaces, not tabs, and put quotes around text that starts with a special character"
     return message
 
 
@@ -210,6 +210,8 @@ class _Composer:
 
     def report(self, position: int, message: str, path: Path) -> None:
         self.problems.append(Problem(self.name, *_unpack(position), dotted(path), message))
+        if len(self.problems) == MAX_PROBLEMS:
+            raise SceneError(self.problems)
 
     def at(self, line: int, column: int) -> int:
         """The packed position of a line and column (from 0) of the text."""
@@ -243,7 +245,7 @@ class _Composer:
         if isinstance(event, yaml.AliasEvent):
             return self.alias(event.anchor, position, path, depth)
         if event.tag is not None:
-            self.report(position, f"tags such as {_short(event.tag)!r} are not read; remove it", path)
+            self.report(position, f"tags such as {shown(event.tag)} are not read; remove it", path)
         if event.anchor is None:
             return self.content(loader, event, position, path, depth)
         before, deepest = self.nodes, self.deepest
@@ -261,12 +263,11 @@ class _Composer:
         return self.mapping(loader, position, path, depth)
 
     def alias(self, anchor: str | None, position: int, path: Path, depth: int) -> tuple[Any, Marks]:
-        name = _short(str(anchor))
         if anchor not in self.anchors:
-            raise self.failure(position, f"no anchor '&{name}' stands above this alias", path)
+            raise self.failure(position, f"no anchor of the name {shown(anchor)} stands above this alias", path)
         anchored = self.anchors[anchor]
         if anchored is None:
-            raise self.failure(position, f"'*{name}' stands within its own anchor", path)
+            raise self.failure(position, f"the alias {shown(anchor)} stands within its own anchor", path)
         self.nodes += anchored.nodes - 1
         self.expanded += anchored.nodes
         self.deepest = max(self.deepest, depth + anchored.height)
@@ -297,6 +298,8 @@ class _Composer:
             key_position = self.at(event.start_mark.line, event.start_mark.column)
             key = self.key(loader, event, path, depth)
             value, marks = self.node(loader, loader.get_event(), (*path, key), depth + 1)
+            if len(data) == MAX_KEYS:
+                raise self.failure(key_position, f"more than {MAX_KEYS:,} keys in one mapping", path)
             if key in data:
                 first, _ = _unpack(found.keys[key])
                 self.report(key_position, f"this key stands here a second time (first at line {first})", (*path, key))
@@ -308,40 +311,30 @@ class _Composer:
         value, marks = self.node(loader, event, path, depth + 1)
         if isinstance(value, str):
             return value
-        text = event.value if isinstance(event, yaml.ScalarEvent) else "..."
-        what = f"'{_short(text)}'" if isinstance(event, yaml.ScalarEvent) else "a list, mapping or alias"
-        self.report(start_of(marks), f"a key must be text, not {what}", path)
-        return str(text)
+        self.report(start_of(marks), f"a key must be text, not {shown(value)}", path)
+        return str(getattr(event, "value", "?"))
 
     def scalar(self, event: Any, position: int, path: Path) -> Any:
         text = event.value
         if not event.implicit[0]:        # quoted, a block, or tagged
             return text
-        if _NOT_FINITE.match(text):
-            still = "; to hold a particle in place name it in 'pinned'" if "nan" not in text.lower() else ""
+        value = plain(text)
+        if isinstance(value, str) and _NOT_FINITE.match(text):
+            still = "; to hold a particle in place name it in `pinned`" if "nan" not in text.lower() else ""
             self.report(position, f"{text} is not a finite number{still}", path)
             return float(text.replace(".", ""))
-        value = plain(text)
         if isinstance(value, float) and math.isinf(value):
-            self.report(position, f"{_short(text)} is too large a number", path)
+            self.report(position, f"{text[:40]} is too large a number", path)
         return value
 
 
 def plain(text: str) -> str | int | float | bool | None:
-    """What unquoted text means in YAML 1.2. Whole numbers beyond 64 bits become floats."""
-    if _NULL.match(text):
-        return None
-    if text in _BOOLEANS:
-        return _BOOLEANS[text]
-    if _INTEGER.match(text):
-        base = _PREFIXES.get(text[:2], 10)
-        if len(text) < 20:
-            return int(text, base)
-        return float(text) if base == 10 else math.inf
-    if _REAL.match(text):
-        return float(text)
+    """What unquoted text means in YAML 1.2. Whole numbers that may exceed 64 bits become floats."""
+    if text in _WORDS:
+        return _WORDS[text]
+    decimal = _DECIMAL.match(text)
+    if decimal:
+        return int(text) if decimal.lastindex is None and len(text) < 20 else float(text)
+    if _BASED.match(text):
+        return int(text[2:], 8 if text[1] == "o" else 16) if len(text) < 20 else math.inf
     return text
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."

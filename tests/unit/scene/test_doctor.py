@@ -1,0 +1,199 @@
+"""Warnings: each appears for its fault, at its place, and not without it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+from verlet_numba.scene.doctor import examine
+from verlet_numba.scene.load import loads
+from verlet_numba.scene.overlap import overlap_depth
+from verlet_numba.scene.place import place
+
+HEAD = "version: 1\ntime: {duration: 1}\n"
+
+
+def warnings(text, folder=None):
+    loaded = loads(HEAD + text, "scene.yaml")
+    folder = folder or loaded.folder
+    found = examine(loaded.scene, place(loaded.scene, folder, loaded.source), folder, loaded.source)
+    return [(problem.path, problem.message) for problem in found]
+
+
+def paths(text, about, folder=None):
+    return [path for path, message in warnings(text, folder) if about in message]
+
+
+GOOD = """
+bodies: [{kind: box, name: crate, size: [0.4, 0.4, 0.4], mass: 1, position: [0, 0, 0.2]}]
+colliders: [{kind: plane, name: floor}, {kind: room, name: hall, size: [4, 4, 4], position: [0, 0, 2]}]
+"""
+
+
+def test_a_sound_scene_has_no_warnings():
+    assert warnings(GOOD) == []
+    assert warnings("") == []
+
+
+def test_start_inside_a_collider_counts_the_radius():
+    assert paths(GOOD.replace("0.2]}]", "0.1]}]"), "start inside collider floor") == ["bodies.0"]
+    rope = "bodies: [{kind: rope, mass: 1, start: [0, 0, %s], end: [1, 0, %s], segments: 4, thickness: 0.1}]\n"
+    assert paths(rope % (0.05, 0.05) + "colliders: [{kind: plane}]", "start inside") == []
+    assert paths(rope % (0.04, 0.04) + "colliders: [{kind: plane}]", "start inside") == ["bodies.0"]
+    assert paths(rope % (0.04, 0.04) + "colliders: [{kind: plane}]\neffects: {contact: none}", "start inside") == []
+    fixed = (rope % (0.04, 0.04)).replace("}]", ", fixed: true}]")
+    assert paths(fixed + "colliders: [{kind: plane}]", "start inside") == []
+
+
+def test_start_inside_a_mesh_collider(tmp_path):
+    trimesh.creation.box().export(tmp_path / "block.stl")
+    text = GOOD.replace("{kind: plane, name: floor}",
+                        "{kind: mesh, name: block, file: block.stl, position: [%s, 0, 0]}")
+    assert paths(text % 0, "start inside collider block", tmp_path) == ["bodies.0"]
+    assert paths(text % 1, "start inside collider block", tmp_path) == []
+
+
+PAIR = """
+bodies:
+  - {kind: box, name: a, size: [1, 1, 1], mass: 1}
+  - {kind: %s, name: b, mass: 1, position: [%s, 0, 0], rotation: {axis: [0, 0, 1], degrees: 45}, %s}
+"""
+
+
+@pytest.mark.parametrize(("kind", "shape", "touching"), [
+    ("box", "size: [1, 1, 1]", 0.5 + 0.5**0.5),
+    ("cloth", "size: [1, 1], resolution: [3, 3], thickness: 0.1", 0.5 + 0.05 + 0.5**0.5),
+])
+def test_bodies_that_overlap(kind, shape, touching):
+    assert paths(PAIR % (kind, touching - 0.01, shape), "overlaps body a") == ["bodies.1"]
+    assert paths(PAIR % (kind, touching + 0.001, shape), "overlaps body a") == []
+
+
+def test_depth_of_overlap_is_the_least_way_out():
+    loaded = loads(HEAD + PAIR % ("box", 1.1, "size: [1, 1, 1]"), "scene.yaml")
+    a, b = place(loaded.scene, loaded.folder, loaded.source)
+    assert overlap_depth(a, b) == pytest.approx(0.5 + 0.5**0.5 - 1.1)
+
+
+def test_edges_part_boxes_that_no_face_parts():
+    text = """
+bodies:
+  - {kind: box, name: a, size: [2, 1, 1], mass: 1, rotation: {axis: [1, 0, 0], degrees: 45}}
+  - {kind: box, name: b, size: [1, 2, 1], mass: 1, rotation: {axis: [0, 1, 0], degrees: 45}, position: [0, 0, %s]}
+"""
+    assert paths(text % 1.42, "overlaps") == []
+    assert paths(text % 1.41, "overlaps") == ["bodies.1"]
+
+
+def test_ropes_that_overlap_unless_attached():
+    text = """
+bodies:
+  - {kind: rope, name: a, mass: 1, start: [0, 0, 0], end: [1, 0, 0], segments: 10, thickness: 0.02}
+  - {kind: rope, name: b, mass: 1, start: [1, 0, 0], end: [1, 0, 1], segments: 10, thickness: 0.02}
+"""
+    assert paths(text, "overlaps body a") == ["bodies.1"]
+    assert paths(text + "attachments: [[a, 10, b, 0]]", "overlaps") == []
+
+
+def test_too_fast_for_a_thin_collider():
+    """At 480 substeps a second a wall of 0.1 m is passed within one from 48 m/s on."""
+    text = """
+bodies: [{kind: icosahedron, radius: 0.1, mass: 1, position: [0, 0, 2], velocity: [%s, 0, 0]}]
+colliders: [{kind: box, size: [0.1, 5, 5], position: [3, 0, 0]}]
+"""
+    assert paths(text % 47, "may pass through") == []
+    assert paths(text % 49, "use 9 substeps") == ["bodies.0"]
+
+
+def test_sticks_that_are_repeated_stretched_pointlike_or_uneven():
+    text = """
+solver: {order: %s}
+bodies:
+  - kind: particles
+    positions: [[0, 0, 0], [1, 0, 0], [1, 0, 0], [3, 0, 0]]
+    masses: [1, 1, 1, 101]
+    pinned: %s
+    sticks: [[0, 1], [1, 0], [1, 2], [0, 3, 2], [0, 3, 3]]
+"""
+    assert paths(text % ("sequential", []), "same particles as stick 0 (and 1 more sticks)") == ["bodies.0.sticks.1"]
+    assert paths(text % ("sequential", []), "start at the same point") == ["bodies.0.sticks.2"]
+    assert paths(text % ("sequential", []), "starts 3 m long, but its length is 2 m") == ["bodies.0.sticks.3"]
+    assert paths(text % ("sequential", []), "masses of 101:1") == ["bodies.0.sticks.3"]
+    assert paths(text % ("sequential", [3]), "masses of") == []
+    assert paths(text % ("lines", []), "masses of") == []
+
+
+def test_attachments_apart_held_or_uneven():
+    text = """
+bodies:
+  - {kind: box, name: a, size: [1, 1, 1], mass: %s, fixed: %s}
+  - {kind: box, name: b, size: [1, 1, 1], mass: 1, position: [1, 0, 0], pinned: %s}
+attachments: [[a, 4, b, %s]]
+"""
+    assert paths(text % (1, "false", [], 0), "") == ["bodies"]
+    assert paths(text % (1, "false", [], 1), "start 1 m apart") == ["attachments.0"]
+    assert paths(text % (1, "true", [0], 0), "both particles are pinned") == ["attachments.0"]
+    assert paths(text % (101, "false", [], 0), "masses of 101:1") == ["attachments.0"]
+    assert paths(text % (101, "true", [], 0), "masses of") == []
+
+
+def test_bodies_pass_through_each_other():
+    one = "bodies: [{kind: icosahedron, radius: 0.1, mass: 1, count: %s, scatter: {inside: [[0, 0, 0], [2, 2, 2]]}}]\n"
+    assert paths(one % 2, "not simulated yet") == ["bodies"]
+    assert paths(one % 1, "not simulated yet") == []
+    assert paths(one % 2 + "effects: {contact: none}", "not simulated yet") == []
+
+
+def test_float32_far_from_the_origin():
+    text = "bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [%s, 0, 0]}]\noutput: {precision: %s}\n"
+    assert paths(text % (1e7, "float32"), "too coarse") == ["output.precision"]
+    assert paths(text % (1e7, "float64"), "too coarse") == []
+    assert paths(text % (100, "float32"), "too coarse") == []
+    assert paths(text % (1e7, "float64") + "solver: {precision: float32}", "too coarse") == ["solver.precision"]
+
+
+def test_gravity_below_the_spacing_of_float32():
+    text = ("bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [0, 0, 1.6]}]\n"
+            "solver: {substeps: %s, precision: %s}\n")
+    assert paths(text % (200, "float32"), "gravity moves") == ["solver.precision"]
+    assert paths(text % (100, "float32"), "gravity moves") == []
+    assert paths(text % (200, "float64"), "gravity moves") == []
+
+
+def test_positions_in_the_file():
+    loaded = loads(HEAD + GOOD.replace("0.2]}]", "0.1]}]"), "scene.yaml")
+    bodies = place(loaded.scene, loaded.folder, loaded.source)
+    problem = examine(loaded.scene, bodies, loaded.folder, loaded.source)[0]
+    assert str(problem) == ("scene.yaml:4:10: bodies.0: 4 of its 8 particles start inside collider floor, "
+                            "up to 0.1 m deep")
+
+
+def test_examining_loads_no_heavy_library():
+    """Meshes and simulation need them; `check` of any other scene must answer at once."""
+    code = f"""
+import sys
+from verlet_numba.scene.doctor import examine
+from verlet_numba.scene.load import loads
+from verlet_numba.scene.place import place
+loaded = loads({HEAD + GOOD + "seed: 1"!r}, "scene.yaml")
+examine(loaded.scene, place(loaded.scene, loaded.folder, loaded.source), loaded.folder, loaded.source)
+print(sorted({{"numba", "scipy", "trimesh", "matplotlib"}} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_mesh_that_needs_no_bracing(tmp_path):
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.obj")
+    assert warnings("bodies: [{kind: mesh, file: ball.obj, mass: 1}]", tmp_path) == []
+
+
+def test_bracing_is_told(tmp_path, monkeypatch):
+    from verlet_numba.scene import mesh
+
+    full = mesh.tetrahedral_sticks
+    monkeypatch.setattr(mesh, "tetrahedral_sticks", lambda p, t: np.array([s for s in full(p, t) if s[0] > 0]))
+    trimesh.creation.icosphere(1).export(tmp_path / "ball.obj")
+    assert paths("bodies: [{kind: mesh, file: ball.obj, mass: 1}]", "braced by 3 sticks", tmp_path) == ["bodies.0.file"]

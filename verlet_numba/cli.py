@@ -1,0 +1,258 @@
+"""The command line: parse, call, print. Heavy imports stand in the commands that need them, so that --help is quick."""
+
+import json as json_module
+import re
+import shlex
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+from verlet_numba import __version__
+
+FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
+SCENE = click.argument("scene", type=click.Path(path_type=Path))
+SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key of the scene, e.g. solver.substeps=16.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings, no summary.")
+VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Say more about what is done.")
+
+
+def show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    if wanted and not context.resilient_parsing:
+        from importlib.metadata import version
+
+        from verlet_numba.run.layout import FORMAT
+        click.echo(f"verlet-numba {__version__}, file format {FORMAT}, numba {version('numba')}")
+        context.exit()
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.option("--version", is_flag=True, callback=show_version, expose_value=False, is_eager=True,
+              help="Versions of the program, of its files and of Numba.")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(debug: bool) -> None:
+    """Position-based (Verlet) simulation of ropes, cloth and rigid bodies: YAML scenes in, HDF5 trajectories out."""
+
+
+@cli.command()
+@SCENE
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Trajectory file. [default: NAME.vtkhdf]")
+@SETS
+@click.option("--frames", "count", type=click.IntRange(0), help="Frames after frame 0, instead of the scene's duration.")
+@click.option("--threads", type=click.IntRange(1), default=2, show_default=True,
+              help="Most threads to use: with 2, frames are written while the next are simulated.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@AS_JSON
+@QUIET
+@VERBOSE
+def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | None, threads: int, overwrite: bool,
+        as_json: bool, quiet: bool, verbose: bool) -> None:
+    """Simulate SCENE and write its trajectory."""
+    from verlet_numba.scene.prepare import prepare
+
+    prepared = prepare(scene, sets)
+    output = output or Path(default_name(prepared.scene, scene))
+    refuse_existing(output, overwrite)
+    warn(prepared.warnings, quiet)
+
+    from verlet_numba.run.simulate import simulate
+
+    if verbose:
+        say(f"{scene}: {len(prepared.bodies)} bodies, writing {output}")
+    summary = simulate(prepared, output, count=count, command=shlex.join(sys.argv), overwrite=overwrite, threads=threads, quiet=quiet)
+    if as_json:
+        print_json(summary.as_dict())
+    elif not quiet:
+        click.echo(describe(summary))
+    if summary.divergence is not None:
+        say(f"{scene}: {summary.divergence}. {summary.frames} good frames are kept in {output}")
+        raise SystemExit(DIVERGED)
+    if summary.signal is not None:
+        say(f"{scene}: stopped by a signal; {summary.frames} frames are kept in {output}")
+        raise SystemExit(128 + summary.signal)
+
+
+@cli.command()
+@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1, required=True)
+@SETS
+@QUIET
+def check(scenes: tuple[Path, ...], sets: tuple[str, ...], quiet: bool) -> None:
+    """Validate SCENES without simulating them; every error, and the scene doctor's warnings, with line and column."""
+    from verlet_numba.scene.prepare import prepare
+    from verlet_numba.scene.problems import SceneError
+
+    wrong = False
+    for scene in scenes:
+        try:
+            prepared = prepare(scene, sets)
+        except SceneError as error:
+            say(str(error))
+            wrong = True
+        else:
+            warn(prepared.warnings, quiet)
+            if not quiet:
+                click.echo(f"{scene}: good" + (f", {len(prepared.warnings)} warnings" if prepared.warnings else ""))
+    if wrong:
+        raise SystemExit(WRONG)
+
+
+@cli.command()
+@SCENE
+@SETS
+@AS_JSON
+def plan(scene: Path, sets: tuple[str, ...], as_json: bool) -> None:
+    """Show which effects and phases SCENE has and why, its buffers, and the memory and file size to expect."""
+    from verlet_numba.scene.build import build
+    from verlet_numba.scene.plan import plan as make_plan
+    from verlet_numba.scene.prepare import prepare
+
+    prepared = prepare(scene, sets)
+    found = make_plan(prepared, build(prepared.scene, prepared.bodies))
+    if as_json:
+        print_json(found)
+    else:
+        click.echo("\n".join(describe_plan(found)))
+
+
+@cli.command()
+def schema() -> None:
+    """Print the JSON Schema of scene files, with every default."""
+    from verlet_numba.scene.load import json_schema
+
+    print_json(json_schema())
+
+
+@cli.command()
+@click.argument("scenes", type=click.Path(path_type=Path), nargs=-1)
+@QUIET
+def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
+    """Compile what SCENES (default: those of the paper) need into the cache, without simulating."""
+    from verlet_numba.run.warm import paper_scenes, warm_up
+    from verlet_numba.scene.prepare import prepare
+
+    for scene in scenes or paper_scenes():
+        seconds, cache = warm_up(prepare(scene))
+        if not quiet:
+            click.echo(f"{scene}: ready after {seconds:.1f} s, machine code in {cache}")
+
+
+@cli.command()
+@click.argument("trajectory", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="A .png contact sheet or a .gif.")
+@click.option("--frames", help="Frames to show: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) -> None:
+    """Draw TRAJECTORY without a display: a sheet of pictures or an animation."""
+    refuse_existing(output, overwrite)
+    from verlet_numba.study.render import render as draw
+
+    draw(trajectory, output, frames=chosen(frames))
+
+
+def chosen(frames: str | None) -> list[int] | None:
+    """Numbers and ranges FIRST:END:STEP (END not included), separated by commas."""
+    if frames is None:
+        return None
+    numbers: list[int] = []
+    for part in frames.split(","):
+        if not re.fullmatch(r"\s*\d+(:\d+(:[1-9]\d*)?)?\s*", part):
+            raise click.BadParameter(f"{part!r} is neither a frame nor a range FIRST:END:STEP", param_hint="--frames")
+        bounds = [int(word) for word in part.split(":")]
+        numbers += [bounds[0]] if len(bounds) == 1 else range(*bounds)
+    return numbers
+
+
+def default_name(scene: Any, path: Path) -> str:
+    """NAME.vtkhdf in the working folder: the scene's name, or the file's where it has none."""
+    name = re.sub(r"[^\w.+-]+", "_", scene.name).strip("._") if "name" in scene.model_fields_set else ""
+    return f"{name or path.stem}.vtkhdf"
+
+
+def refuse_existing(output: Path, overwrite: bool) -> None:
+    """Before any work: nothing that exists is overwritten unasked, and the folder must be there."""
+    if output.exists() and not overwrite:
+        raise click.ClickException(f"{output} exists already; give another with -o, or --overwrite")
+    if not output.parent.is_dir():
+        raise click.ClickException(f"{output.parent} is no folder; make it first, or give another with -o")
+
+
+def say(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def warn(warnings: Iterable[Any], quiet: bool) -> None:
+    for warning in () if quiet else warnings:
+        say(str(warning._replace(message=f"warning: {warning.message}")))
+
+
+def print_json(document: Any) -> None:
+    click.echo(json_module.dumps(document, indent=2, allow_nan=False))
+
+
+def describe(summary: Any) -> str:
+    """A summary in lines of name and value."""
+    seconds = ", ".join(f"{name} {value:.3f} s" for name, value in summary.seconds.items())
+    return "\n".join([
+        f"{summary.output}: {summary.status}, {summary.frames} frames, {summary.simulated_seconds:.6g} s simulated",
+        f"  speed             {summary.steps_per_second:,.0f} steps/s, {summary.real_time_factor:,.1f} times real time",
+        f"  relaxations       {summary.relaxations:,}",
+        f"  contacts          {summary.contacts} at most",
+        f"  constraint error  {summary.constraint_error_max:.3g} at most",
+        f"  penetration       {summary.penetration_max:.3g} m at most",
+        f"  time              {seconds}"])
+
+
+def describe_plan(found: dict[str, Any]) -> Iterable[str]:
+    """A plan in lines: phases, groups, buffers, sizes."""
+    yield (f"{found['particles']} particles, {found['distance_constraints']} sticks, {found['frames']} frames of "
+           f"{found['substeps_a_frame']} substeps of {found['step_seconds']:.3g} s")
+    yield "phases:"
+    for phase in found["phases"]:
+        yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<26}{phase['why']}"
+    yield "groups:"
+    for group in found["groups"]:
+        yield (f"  {group['copies']} x {group['kind']} of {group['particles_a_copy']} particles, {group['copies_a_block']} a block: "
+               f"{group['lanes']}")
+    yield "buffers:"
+    for name, size in found["buffers"].items():
+        yield f"  {size / 1e6:10.3f} MB  {name}"
+    yield f"memory: about {found['memory_bytes'] / 1e6:.0f} MB"
+    yield f"file: at most {found['file_bytes_at_most'] / 1e6:.2f} MB, less as it compresses"
+
+
+def fail(error: BaseException, code: int, text: str) -> NoReturn:
+    """End with one message; with --debug, with the traceback."""
+    if "--debug" in sys.argv:
+        raise error
+    say(text)
+    sys.exit(code)
+
+
+def main() -> None:
+    """Run the command line; every error ends in a message and the contract's exit code."""
+    from verlet_numba.scene.problems import SceneError
+
+    try:
+        cli.main(prog_name="verlet-numba", standalone_mode=False)
+    except SceneError as error:
+        fail(error, WRONG, str(error))
+    except click.UsageError as error:
+        error.show()
+        sys.exit(WRONG)
+    except click.ClickException as error:
+        fail(error, FAILED, f"verlet-numba: {error.format_message()}")
+    except (click.Abort, KeyboardInterrupt) as error:
+        fail(error, INTERRUPTED, "verlet-numba: interrupted")
+    except MemoryError as error:
+        fail(error, FAILED, "verlet-numba: out of memory; `verlet-numba plan` tells how much a scene needs")
+    except Exception as error:
+        fail(error, FAILED, f"verlet-numba: {one_line(error)}")
+
+
+def one_line(error: Exception) -> str:
+    """An error without its traceback, in one line."""
+    words = " ".join(str(error).split())
+    return words if isinstance(error, OSError | ValueError) and words else f"{type(error).__name__}: {words}"

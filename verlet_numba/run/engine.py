@@ -1,0 +1,89 @@
+"""The frame loop as Python sees it: start a model, advance it by a chunk of frames, take its state back."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from verlet_numba.buffers import FRAME, Array, Frames, World, gate
+from verlet_numba.frame import FULL, accelerate, advance, substep
+from verlet_numba.scene.build import Model
+from verlet_numba.scene.colliders import room
+
+
+def start(model: Model) -> Model:
+    """Positions at time 0, and the previous positions x0 - v0 h + a0 h^2/2: exact for constant acceleration.
+
+    x0 - v0 h alone would put an error of -g h t/2 into free fall.
+    """
+    particles, h = model.world.particles, model.world.solver.step
+    position, velocity = (np.zeros(particles.position.shape) for _ in range(2))
+    for body, index in zip(model.bodies, model.numbering.bodies, strict=True):
+        position[:, index] = np.moveaxis(body.positions, 2, 0)
+        velocity[:, index] = np.where(body.pinned, 0.0, np.moveaxis(body.velocities, 2, 0))
+    particles.position[:] = position
+    particles.previous[:] = position - velocity * h
+    if particles.acceleration is not None:
+        accelerate(particles, model.world.effects, h)
+        particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
+    return model
+
+
+def grown(world: World) -> World:
+    """The same world with room for twice the contacts; those listed so far are found again."""
+    effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
+    assert contact is not None
+    capacity = 2 * contact.particle.size
+    particle, solid, normal, bound, anchor, push = room(capacity)
+    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
+    if restitution is not None:
+        restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
+    return world._replace(effects=effects._replace(contact=contact, restitution=restitution))
+
+
+def run_chunk(model: Model, chunk: Frames) -> int:
+    """The next len(chunk.measures) frames. Returns OK, or DIVERGED with the clock's FRAME at the first that is not sound."""
+    model.world.clock[FRAME] = 0
+    while (status := advance(model.world, chunk)) == FULL:
+        model.world = grown(model.world)
+    return int(status)
+
+
+def run_substep(model: Model) -> None:
+    """One substep alone, bit for bit as within a chunk."""
+    while substep(model.world) == FULL:
+        model.world = grown(model.world)
+
+
+@dataclass(frozen=True)
+class State:
+    """What changes from substep to substep, copied; restoring it repeats what followed bit for bit."""
+
+    arrays: tuple[Array, ...]
+
+    @staticmethod
+    def moving(world: World) -> tuple[Array, ...]:
+        """The arrays of a world that a substep leaves changed for the next."""
+        solids: tuple[Array, ...] = ()
+        if world.effects.moving is not None and world.effects.contact is not None:
+            placed = world.effects.contact.solids
+            solids = (placed.origin, placed.rotation, placed.origin_before, placed.rotation_before)
+        return (world.particles.position, world.particles.previous, world.clock, world.snapshot.counts, *solids)
+
+    @classmethod
+    def of(cls, model: Model) -> "State":
+        return cls(tuple(array.copy() for array in cls.moving(model.world)))
+
+    def restore(self, model: Model) -> None:
+        for array, saved in zip(self.moving(model.world), self.arrays, strict=True):
+            array[...] = saved
+
+
+def sound(world: World) -> bool:
+    """Whether all positions are finite."""
+    return bool(np.isfinite(world.particles.position).all())
+
+
+def compiled() -> Any:
+    """Signatures that the frame loop has machine code for in this process."""
+    return advance.signatures  # type: ignore[attr-defined]

@@ -1,0 +1,94 @@
+"""Which bodies overlap where they start, and how deeply. Scattered copies are placed clear of everything."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from verlet_numba.scene.body import Body, Floats
+from verlet_numba.scene.clearance import hull_clearance, planes
+from verlet_numba.scene.problems import Path as Key
+from verlet_numba.scene.schema import Scene
+from verlet_numba.scene.shapes import edges
+
+TOUCH = 1e-6            # of the smaller body's size: overlap up to this is touching
+MOST_BODIES = 2000      # more bodies than this, and
+MOST_AXES = 50_000      # pairs with more candidate axes than this, are not compared
+CHUNK = 2_000_000       # pairs of points looked at together
+
+
+def overlaps(scene: Scene, bodies: list[Body]) -> Iterator[tuple[Key, str]]:
+    """Pairs of bodies that overlap at the start, except those attached to each other, under the later one's path."""
+    once = [index for index, entry in enumerate(scene.bodies) if not entry.scatter]
+    if not 2 <= len(once) <= MOST_BODIES:
+        return
+    attached = {frozenset((a, b)) for a, _, b, _ in scene.attachments}
+    points = [bodies[index].positions[0] for index in once]
+    radii = np.array([bodies[index].shape.radius for index in once])[:, None]
+    lower = np.array([p.min(axis=0) for p in points]) - radii
+    upper = np.array([p.max(axis=0) for p in points]) + radii
+    meet = ((lower[:, None] < upper) & (lower < upper[:, None])).all(axis=2)
+    for second, first in np.argwhere(np.tril(meet, -1)).tolist():
+        a, b = bodies[once[first]], bodies[once[second]]
+        if frozenset((a.name, b.name)) in attached or (a.pinned.all() and b.pinned.all()):
+            continue
+        smaller = min((upper[index] - lower[index]).max() for index in (first, second))
+        depth = overlap_depth(a, b)
+        if depth > TOUCH * smaller:
+            yield ("bodies", once[second]), f"overlaps body {a.name} at the start, by {depth:.3g} m"
+
+
+def overlap_depth(a: Body, b: Body) -> float:
+    """How deeply the first copies of two bodies overlap, m; 0 if they do not, as far as it can be told cheaply.
+
+    Rigid bodies are compared as convex hulls, a rigid and another one by the other's particles, and the rest by their
+    particles alone.
+    """
+    radius = a.shape.radius + b.shape.radius
+    if a.shape.rigid and b.shape.rigid:
+        return hull_overlap(a, b)
+    if a.shape.rigid or b.shape.rigid:
+        solid, soft = (a, b) if a.shape.rigid else (b, a)
+        apart = hull_clearance(solid.positions[0], solid.shape.triangles, soft.positions[0])
+        return max(0.0, radius - float(apart.min()))
+    return max(0.0, radius - _distance(a.positions[0], b.positions[0], radius)) if radius > 0 else 0.0
+
+
+def _distance(a: Floats, b: Floats, limit: float) -> float:
+    """The least distance between two sets of points, `limit` if it is larger; only where their boxes meet is looked."""
+    a = a[((a >= b.min(axis=0) - limit) & (a <= b.max(axis=0) + limit)).all(axis=1)]
+    if len(a):
+        b = b[((b >= a.min(axis=0) - limit) & (b <= a.max(axis=0) + limit)).all(axis=1)]
+    nearest = limit
+    chunk = max(1, CHUNK // max(1, len(b)))
+    for start in range(0, len(a) if len(b) else 0, chunk):
+        nearest = min(nearest, float(np.linalg.norm(a[start:start + chunk, None] - b, axis=2).min()))
+    return nearest
+
+
+def hull_overlap(a: Body, b: Body) -> float:
+    """Depth by which two convex polyhedra overlap: the least overlap of their shadows on the axes that can part them.
+
+    Those are the normals of the faces of both, and the cross products of an edge of one and an edge of the other.
+    """
+    p, q = a.positions[0], b.positions[0]
+    u, v = _directions(a), _directions(b)
+    if len(u) * len(v) > MOST_AXES:
+        return 0.0
+    axes = np.concatenate([planes(p, a.shape.triangles)[0], planes(q, b.shape.triangles)[0],
+                           np.cross(u[:, None], v).reshape(-1, 3)])
+    length = np.linalg.norm(axes, axis=1)
+    axes = axes[length > 1e-9] / length[length > 1e-9, None]
+    on_a, on_b = p @ axes.T, q @ axes.T
+    shared = np.minimum(on_a.max(axis=0) - on_b.min(axis=0), on_b.max(axis=0) - on_a.min(axis=0))
+    return max(0.0, float(shared.min()))
+
+
+def _directions(body: Body) -> Floats:
+    """Unit directions (E, 3) of a body's edges, parallel ones once."""
+    ends = body.positions[0][edges(body.shape.triangles)]
+    direction = ends[:, 1] - ends[:, 0]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    dominant = np.argmax(np.abs(direction), axis=1)
+    direction *= np.sign(np.take_along_axis(direction, dominant[:, None], axis=1))
+    _, first = np.unique(np.round(direction, 9), axis=0, return_index=True)
+    return np.asarray(direction[first])

@@ -1,0 +1,135 @@
+"""What a scene's simulation consists of: every effect and phase, active or absent, and why; sizes in memory and on disk."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from verlet_numba.buffers import COLUMNS, World
+from verlet_numba.scene.build import Model
+from verlet_numba.scene.prepare import Prepared
+
+INTERPRETER = 160 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
+CHUNK_BYTES = 32 << 20      # of a chunk of frames on its way to the file, at most
+FRAME_MEASURES = COLUMNS * 8 + 5 * 8
+
+
+class Phase(NamedTuple):
+    name: str
+    active: bool
+    why: str
+
+
+def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
+    """The plan as plain data: phases, groups, buffers (bytes), memory and file size (bytes)."""
+    sizes = dict(buffers(model.world))
+    total = sum(sizes.values())
+    scene = prepared.scene
+    return {
+        "particles": model.particles, "frames": frame_count(scene), "substeps_a_frame": scene.solver.substeps,
+        "step_seconds": model.world.solver.step,
+        "distance_constraints": len(model.world.observed.rest),
+        "phases": [phase._asdict() for phase in phases(prepared, model)],
+        "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot), "copies_a_block": group.block,
+                    "lanes": lanes(model, g)} for g, group in enumerate(model.numbering.groups)],
+        "buffers": sizes,
+        "memory_bytes": INTERPRETER + total + 3 * chunk_bytes(model),
+        "file_bytes_at_most": file_bytes(model)}
+
+
+def frame_count(scene: Any) -> int:
+    """Frames of the file, the start included."""
+    return int(round(scene.time.duration * scene.time.frame_rate)) + 1
+
+
+def lanes(model: Model, g: int) -> str:
+    group = model.numbering.groups[g]
+    if not len(group.shape.sticks):
+        return "no sticks"
+    first, last = group.first, group.first + group.size
+    runs = model.world.runs
+    mine = [] if runs is None else [int(n) for i, n in zip(runs.first[0], runs.lanes, strict=True) if first <= i < last]
+    return f"{len(mine)} runs of up to {max(mine)} lanes" if mine else "stick by stick"
+
+
+def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
+    """Every phase of a substep in its order."""
+    scene, world = prepared.scene, model.world
+    effects, active = scene.effects, world.effects
+    cloth = any(body.shape.kind == "cloth" for body in prepared.bodies)
+    named, unnamed = "named in effects", "not named in effects"
+    moves = bool((world.particles.inverse_mass > 0).any())
+    yield Phase("gravity", active.gravity is not None, named if effects.gravity else unnamed)
+    yield Phase("wind", active.wind is not None,
+                unnamed if effects.wind is None else named if cloth else "named, but no body has triangles of cloth")
+    yield Phase("drag", active.drag is not None, named if effects.drag else unnamed)
+    yield Phase("damping", active.damping is not None, named if effects.damping is not None else unnamed)
+    yield Phase("integrate", moves, "particles move" if moves else "nothing can move")
+    yield Phase("paths of pinned particles", active.carried is not None,
+                "a body has a path" if active.carried else "no body has a path")
+    yield Phase("motion of colliders", active.moving is not None,
+                "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
+    yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
+    yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other")
+    yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))
+    yield Phase("runs of sticks", world.runs is not None,
+                "ropes, cloth or several bodies of one kind" if world.runs else "no rope, no cloth, no body in several copies")
+    yield Phase("single sticks", world.sticks is not None,
+                "bodies without copies, or attachments" if world.sticks else "no single body with sticks, no attachment")
+    soft = world.runs_softness is not None or world.sticks_softness is not None
+    yield Phase("compliance over passes", soft, "a body is compliant and there are several passes" if soft
+                else "no body is compliant, or one pass a substep, where it is part of the weights")
+    yield Phase("tolerance", world.solver.tolerance is not None,
+                "solver.tolerance is above 0" if world.solver.tolerance else "solver.tolerance is 0: every stick is relaxed")
+    yield Phase("angles", world.angles is not None, "a body keeps angles" if world.angles else "no body keeps angles")
+    yield Phase("friction", active.friction is not None, material_reason(active.contact, active.friction, "friction"))
+    yield Phase("velocities", "velocity" in scene.output.fields, "named in output.fields" if scene.output.fields
+                else "not named in output.fields")
+
+
+def contact_reason(prepared: Prepared, moves: bool) -> str:
+    if not prepared.scene.colliders:
+        return "the scene has no collider"
+    if prepared.scene.effects.contact == "none":
+        return "effects.contact is none"
+    return "the scene has colliders" if moves else "nothing can move"
+
+
+def material_reason(contact: object, effect: object, name: str) -> str:
+    if contact is None:
+        return "nothing touches"
+    return f"materials that meet have {name}" if effect is not None else f"no materials that meet have {name}"
+
+
+def buffers(world: World) -> Iterator[tuple[str, int]]:
+    """Bytes of every part of the world that exists."""
+    for name, part in world._asdict().items():
+        if name == "effects":
+            for effect, value in part._asdict().items():
+                if value is not None:
+                    yield f"effects.{effect}", size(value)
+        elif isinstance(part, tuple) and name != "solver":
+            yield name, size(part)
+
+
+def size(part: Any) -> int:
+    """Bytes of all arrays of a buffer."""
+    if isinstance(part, tuple):
+        return sum(size(value) for value in part)
+    return part.nbytes if isinstance(part, np.ndarray) else 0
+
+
+def frame_bytes(model: Model) -> int:
+    output = model.scene.output
+    return model.particles * 3 * (4 if output.precision == "float32" else 8) * (1 + len(output.fields)) + FRAME_MEASURES
+
+
+def chunk_bytes(model: Model) -> int:
+    """Bytes of the largest chunk of frames."""
+    return min(max(frame_bytes(model), CHUNK_BYTES), frame_bytes(model) * frame_count(model.scene))
+
+
+def file_bytes(model: Model) -> int:
+    """Size of the file if nothing could be compressed."""
+    constraints, cells = len(model.world.observed.rest), sum(len(body.shape.triangles) * body.copies for body in model.bodies)
+    return frame_bytes(model) * frame_count(model.scene) + constraints * 24 + cells * 40 + model.particles * 12 + 65536
