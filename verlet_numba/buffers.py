@@ -133,6 +133,7 @@ class Contacts(NamedTuple):
 
     solids: Solids
     radius: Array               # (n,) real m; contact radius
+    body: Array                 # (n,) int 1; rigid body that answers as a whole, -1: the particle answers alone
     margin: float               # double m; how near a particle must come to be listed
     listed: Array               # (1,) int 1; how many contacts there are
     particle: Array             # (L,) int 1
@@ -141,6 +142,24 @@ class Contacts(NamedTuple):
     bound: Array                # (L,) double m; normal . position must not be below it
     anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
     push: Array                 # (L,) double m; displacement along the normal given so far
+    after: Array                # (L,) int 1; next contact of the same rigid body, -1: none
+
+
+class Rigid(NamedTuple):
+    """Rigid bodies without pins, which answer to contacts as a whole."""
+
+    first: Array                # (G,) int 1; inner index of the first particle
+    stride: Array               # (G,) int 1; from one particle to the next
+    size: Array                 # (G,) int 1; particles
+    head: Array                 # (G,) int 1; first contact of the substep, -1: untouched
+    order: Array                # (G,) int 1; bodies that are touched
+    touched: Array              # (1,) int 1; how many are
+    inverse_mass: Array         # (G,) double 1/kg
+    centre: Array               # (3, G) double m
+    inverse_inertia: Array      # (6, G) double 1/(kg m^2); xx, yy, zz, xy, xz, yz
+    wanted: Array               # (L,) double m; how far a contact has to rise
+    given: Array                # (L,) double m; pushes of a rebound
+    grip: Array                 # (3, L) double kg m; impulse of friction
 
 
 class Friction(NamedTuple):
@@ -164,6 +183,7 @@ class Effects(NamedTuple):
     carried: Carried | None
     moving: Moving | None
     contact: Contacts | None
+    rigid: Rigid | None
     friction: Friction | None
     restitution: Restitution | None
 

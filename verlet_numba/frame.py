@@ -12,6 +12,7 @@ from verlet_numba.effects.drag import resist
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.motion import carry, move
+from verlet_numba.effects.response import gather, rebound, rub_bodies, shove
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
@@ -55,14 +56,18 @@ def substep(world):
         clock[STAGE] = INTEGRATED
     if not find_contacts(particles, contact):
         return FULL
+    gather(particles, contact, effects.rigid)
     foresee(particles, contact, effects.restitution, h)
     forget(world.runs_softness)
     forget(world.sticks_softness)
     for _ in range(solver.passes):
         separate(particles.position, contact)          # before every pass (P18): last or once only holds less
+        shove(particles, contact, effects.rigid)
         world.snapshot.counts[0] += relax(world)
     bounce(particles, contact, effects.restitution)
+    rebound(particles, contact, effects.restitution, effects.rigid)
     rub(particles.position, contact, effects.friction)
+    rub_bodies(particles, contact, effects.friction, effects.rigid)
     clock[NUMBER] += 1
     clock[STAGE] = WHOLE
     return OK

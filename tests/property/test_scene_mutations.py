@@ -137,9 +137,10 @@ def test_mutated_overrides_load_or_are_refused(tmp_path: Path) -> None:
     dice = random.Random(1)
     path = tmp_path / "scene.yaml"
     path.write_bytes(SCENE)
-    paths = ["bodies.sheet.mass", "bodies.0", "bodies.1.pinned", "bodies.pendulum.sticks.0.2", "bodies", "seed", "expect",
-             "effects.friction.static", "effects.drag", "effects.wind.velocity", "solver.order", "colliders.1.path.0",
-             "colliders.plane_0.normal", "time", "time.duration", "attachments.0", "x.y.z", "bodies.9", "name.x", "a..b"]
+    paths = ["bodies.sheet.mass", "bodies.0", "bodies.1.pinned", "bodies.pendulum.sticks.0.2", "bodies", "seed",
+             "expect", "effects.friction.static", "effects.drag", "effects.wind.velocity", "solver.order",
+             "colliders.1.path.0", "colliders.plane_0.normal", "time", "time.duration", "attachments.0", "x.y.z",
+             "bodies.9", "name.x", "a..b"]
     results = []
     for _ in range(300):
         value = dice.choice(VALUES).decode("utf-8", "surrogateescape")

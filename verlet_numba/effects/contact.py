@@ -112,6 +112,8 @@ def separate(position, contact):
         return
     for c in range(contact.listed[0]):
         k, given = contact.particle[c], contact.push[c]
+        if contact.body[k] >= 0:        # answers as a whole (effects/response.py)
+            continue
         push = max(0.0, given - height(position, contact, c))
         if push != given:
             for axis in range(3):

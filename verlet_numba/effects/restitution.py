@@ -52,8 +52,9 @@ def bounce(particles, contact, restitution):
     if restitution is None:
         return
     for c in range(contact.listed[0]):
-        if restitution.rebound[c] > 0.0 and contact.push[c] > 0.0:
-            k, excess = contact.particle[c], approach(particles.position, contact, c) - restitution.rebound[c]
+        k = contact.particle[c]
+        if restitution.rebound[c] > 0.0 and contact.push[c] > 0.0 and contact.body[k] < 0:
+            excess = approach(particles.position, contact, c) - restitution.rebound[c]
             contact.push[c] -= excess
             for axis in range(3):
                 particles.previous[axis, k] += excess * contact.normal[axis, c]

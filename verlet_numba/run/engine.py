@@ -34,11 +34,15 @@ def grown(world: World) -> World:
     effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
     assert contact is not None
     capacity = 2 * contact.particle.size
-    particle, solid, normal, bound, anchor, push = room(capacity)
-    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
+    particle, solid, normal, bound, anchor, push, after = room(capacity)
+    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push, after=after)
     if restitution is not None:
         restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
-    return world._replace(effects=effects._replace(contact=contact, restitution=restitution))
+    rigid = effects.rigid
+    if rigid is not None:
+        wanted, given, grip = (gate(np.zeros(shape), np.float64) for shape in (capacity, capacity, (3, capacity)))
+        rigid = rigid._replace(wanted=wanted, given=given, grip=grip)
+    return world._replace(effects=effects._replace(contact=contact, restitution=restitution, rigid=rigid))
 
 
 def run_chunk(model: Model, chunk: Frames) -> int:

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import BOX, CYLINDER, PLANE, SPHERE, Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Solids, gate
-from verlet_numba.scene.body import Body, Floats
+from verlet_numba.buffers import BOX, CYLINDER, PLANE, SPHERE, Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Rigid, Solids, gate
+from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_colliders import BaseCollider
@@ -110,6 +110,7 @@ def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
 class Contact(NamedTuple):
     moving: Moving | None
     contact: Contacts | None
+    rigid: Rigid | None
     friction: Friction | None
     restitution: Restitution | None
 
@@ -117,21 +118,40 @@ class Contact(NamedTuple):
 def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Contact:
     """Contact with colliders and the materials that meet; all None without colliders, particles or the wish."""
     if not scene.colliders or scene.effects.contact == "none" or not (inverse_mass > 0).any():
-        return Contact(None, None, None, None)
+        return Contact(None, None, None, None, None)
     found, arrays = solids_of(scene)
     lengths = np.concatenate([np.zeros(0), *(body.shape.lengths for body in bodies)])
     margin = MARGIN * float(lengths[lengths > 0].min(initial=0.0 if not (lengths > 0).any() else np.inf))
     radius = spread(numbering, [np.full(index.shape, body.shape.radius) for body, index in zip(bodies, numbering.bodies, strict=True)],
                     len(inverse_mass))
-    contact = Contacts(arrays, gate(radius, real), margin, gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
-    return Contact(moving(found), contact, friction_of(scene, found, bodies, numbering, len(inverse_mass), real),
+    rigid, body = rigid_of(bodies, numbering, len(inverse_mass))
+    contact = Contacts(arrays, gate(radius, real), gate(body, np.int64), margin, gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
+    return Contact(moving(found), contact, rigid, friction_of(scene, found, bodies, numbering, len(inverse_mass), real),
                    restitution_of(scene, found, bodies, numbering, len(inverse_mass), real))
 
 
-def room(capacity: int) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Empty contact buffers: particle, solid, normal, bound, anchor, push."""
+def room(capacity: int) -> tuple[Array, ...]:
+    """Empty contact buffers: particle, solid, normal, bound, anchor, push, after."""
     return (gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros((3, capacity)), np.float64),
-            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64))
+            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64),
+            gate(np.zeros(capacity), np.int64))
+
+
+def rigid_of(bodies: list[Body], numbering: Numbering, size: int) -> tuple[Rigid | None, Integers]:
+    """Rigid bodies without pins, and which of them each particle (n,) belongs to."""
+    whole = [(body, index) for body, index in zip(bodies, numbering.bodies, strict=True) if body.shape.rigid and not body.pinned.any()]
+    belongs = np.full(size, -1, np.int64)
+    if not whole:
+        return None, belongs
+    first = np.concatenate([index[:, 0] for _, index in whole])
+    stride = np.concatenate([index[:, 1] - index[:, 0] for _, index in whole])
+    counts = np.concatenate([np.full(len(index), index.shape[1]) for _, index in whole])
+    for b, (start, step, count) in enumerate(zip(first, stride, counts, strict=True)):
+        belongs[start:start + step * count:step] = b
+    total = len(first)
+    whole_numbers = [gate(array, np.int64) for array in (first, stride, counts, np.full(total, -1), np.zeros(total), np.zeros(1))]
+    doubles = [gate(np.zeros(shape), np.float64) for shape in (total, (3, total), (6, total), FIRST_ROOM, FIRST_ROOM, (3, FIRST_ROOM))]
+    return Rigid(*whole_numbers, *doubles), belongs
 
 
 def spread(numbering: Numbering, values: list[Any], size: int) -> Floats:

@@ -12,6 +12,7 @@ from verlet_numba.scene.shapes import ShapeError, edges, share_mass, stick_lengt
 FORMATS = (".obj", ".off", ".ply", ".stl")
 MERGE = 1e-7            # vertices closer than this part of the size are one
 FLAT = 1e-9             # a triangle whose height is below this part of its longest side has no area
+LARGEST = 1e9           # coordinate of a vertex, in the file's unit
 CONVEX = 1e-5           # how far, in parts of the size, a vertex may lie outside the plane of a triangle
 
 
@@ -50,14 +51,15 @@ def load(file: Path) -> tuple[Floats, Integers]:
         surface = trimesh.load_mesh(file, process=False, skip_materials=True)
         positions, triangles = np.array(surface.vertices, np.float64), np.array(surface.faces, np.int64)
     except Exception as error:      # whatever a broken file does to the parser
-        raise ShapeError(f"{file.name}: not a readable mesh ({error})", "file") from error
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ShapeError(f"{file.name}: not a readable mesh ({reason})", "file") from error
     if len(triangles) == 0:
         raise ShapeError(f"{file.name}: has no triangles", "file")
     unknown = np.flatnonzero(((triangles < 0) | (triangles >= len(positions))).any(axis=1))
     if len(unknown):
         raise ShapeError(f"triangle {unknown[0]} uses a vertex that does not exist", "file")
-    if not np.isfinite(positions[triangles]).all():
-        raise ShapeError(f"{file.name}: has coordinates that are not finite", "file")
+    if not (np.abs(positions[triangles]) <= LARGEST).all():
+        raise ShapeError(f"{file.name}: has coordinates that are not finite or beyond {LARGEST:g}", "file")
     return _merged(positions, triangles)
 
 

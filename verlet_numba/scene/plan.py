@@ -70,6 +70,8 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("motion of colliders", active.moving is not None,
                 "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
     yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
+    yield Phase("whole-body response", active.rigid is not None, "rigid bodies without pins meet colliders" if active.rigid
+                else "no rigid body without pins meets a collider")
     yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other")
     yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))
     yield Phase("runs of sticks", world.runs is not None,

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-FRAGMENTS = 1 << 21     # pixels tested at once
+FRAGMENTS = 1 << 17     # pixels tested at once
 NOTHING = -1
 
 
@@ -25,7 +25,8 @@ class Camera(NamedTuple):
         """Pixels (..., 2) and depths (...) m of points (..., 3)."""
         x, y, depth = np.moveaxis((points - self.eye) @ self.axes.T, -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.stack([0.5 * self.width + self.focal * x / depth, 0.5 * self.height - self.focal * y / depth], -1), depth
+            column, row = 0.5 * self.width + self.focal * x / depth, 0.5 * self.height - self.focal * y / depth
+        return np.stack([column, row], -1), depth
 
 
 def frame_points(points: Floats, width: int, height: int, azimuth: float = -55.0, elevation: float = 20.0,
@@ -48,7 +49,7 @@ def frame_points(points: Floats, width: int, height: int, azimuth: float = -55.0
         high, low = (side - t * z).max(), (-side - t * z).max()
         middle.append(0.5 * (high - low))       # ex, then ey
         distance = max(distance, 0.5 * (high + low) / t)
-    distance = max(distance, 1e-3 - z.min(), 1e-9)
+    distance = max(distance, 0.05 * (np.linalg.norm(np.ptp(points, axis=0)) or 1.0) - z.min())
     return Camera(np.array([*middle, -distance]) @ axes, axes, focal, width, height)
 
 
@@ -66,14 +67,15 @@ def visible(camera: Camera, triangles: Floats) -> NDArray[np.int32]:
         low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, screen)
         high = np.clip(np.floor(corners.max(axis=1) - 0.5), -1, screen - 1)
     size = (high - low + 1).max(axis=1)
-    seen = (depth > 1e-9).all(axis=1) & (high >= low).all(axis=1)
+    seen = (depth > 0).all(axis=1) & (high >= low).all(axis=1)
     exponent = np.ceil(np.log2(np.maximum(size, 1))).astype(int)
     for level in np.unique(exponent[seen]):
         numbers = np.flatnonzero(seen & (exponent == level))
         step = max(1, FRAGMENTS >> (2 * int(level)))
         for start in range(0, len(numbers), step):
             part = numbers[start:start + step]
-            _draw(corners[part], 1 / depth[part], low[part], high[part], 1 << int(level), part, camera.width, nearest, found)
+            _draw(corners[part], 1 / depth[part], low[part], high[part], 1 << int(level), part, camera.width,
+                  nearest, found)
     return found.reshape(camera.height, camera.width)
 
 

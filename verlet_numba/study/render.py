@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from verlet_numba.study import reader
 from verlet_numba.study.camera import NOTHING, Camera, Floats, frame_points, visible
 from verlet_numba.study.reader import Trajectory
-from verlet_numba.study.surfaces import Surface, body_surfaces, ground, placed, room, solid, surface, COLLIDER
+from verlet_numba.study.surfaces import COLLIDER, Surface, body_surfaces, ground, placed, room, solid, surface
 
-SKY = np.array([[0.90, 0.93, 0.97], [1.0, 1.0, 1.0]])       # above, below
-BACKGROUND = np.array([0.97, 0.98, 0.99])                   # what grounds fade into
-LIGHT = np.array([0.25, -0.45, 0.86])
+BACKGROUND = np.array([0.96, 0.97, 0.99])
+LIGHT = np.array([-0.24, -0.54, 0.81])      # towards it: above, from the left and a little from the front
 FINE = 2                # pixels a side that make one of the picture
-SHADOW = 0.72
+SHADOW_DEPTH = 0.38
+SOFT = 2.5              # pixels, the blur of a shadow's edge
 SHEET_FRAMES, GIF_FRAMES = 6, 120
 FRAMED = 60             # frames the camera is fitted to
 INK = (40, 44, 52)
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])      # of a cube
 
 
 class RenderError(Exception):
@@ -40,11 +41,14 @@ def render(path: str | Path, output: str | Path, frames: Sequence[int] | None = 
         raise RenderError(f"{output}: cannot write {output.suffix or 'a file without suffix'}; use .png or .gif")
     with reader.open(path) as trajectory:
         chosen = choose(trajectory, frames, GIF_FRAMES if output.suffix.lower() == ".gif" else SHEET_FRAMES)
-        view = View(trajectory, width, height)
-        pictures = (label(view.draw(frame), f"{trajectory.time[frame]:.2f} s") for frame in chosen)
         title = str(trajectory.scene.get("name") or Path(path).stem)
+        try:
+            view = View(trajectory, width, height)
+            pictures = [label(view.draw(frame), f"{trajectory.time[frame]:.2f} s") for frame in chosen]
+        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+            raise RenderError(f"{path}: cannot be drawn, its scene or its numbers are damaged ({error!r})") from error
         if output.suffix.lower() == ".png":
-            sheet(list(pictures), title).save(output)
+            sheet(pictures, title).save(output)
         else:
             animation(pictures, trajectory.time[chosen], title, output)
     return chosen
@@ -69,60 +73,70 @@ class View:
     def __init__(self, trajectory: Trajectory, width: int, height: int) -> None:
         self.trajectory = trajectory
         self.colliders = [entry for entry in trajectory.scene.get("colliders") or () if isinstance(entry, dict)]
-        self.folder = trajectory.path.parent
+        self.solids = [solid(collider, trajectory.path.parent) for collider in self.colliders]
         self.light = LIGHT / np.linalg.norm(LIGHT)
         shown = choose(trajectory, None, FRAMED)
         points = trajectory.positions(shown).astype(float).reshape(-1, 3)
         points = points[np.isfinite(points).all(axis=1)]
-        low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (-np.ones(3), np.ones(3))
-        self.scale = max(float(np.linalg.norm(high - low)), 1e-6)
+        self.scale = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
         points = np.concatenate([points, *self._framed_colliders(shown)])
-        low, high = points.min(axis=0), points.max(axis=0)
-        self.centre, self.scale = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 1e-6)
-        margin = 0.01 * self.scale * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        corners = (points[:, None] + margin).reshape(-1, 3) if len(points) < 1e5 else points
-        self.camera = frame_points(corners, FINE * width, FINE * height)
+        self.scale = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+        self.centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        self.camera = frame_points(points, FINE * width, FINE * height)
 
     def _framed_colliders(self, frames: list[int]) -> Iterable[Floats]:
         """Corners of the colliders that are not much larger than the motion."""
-        for collider in self.colliders:
-            half = 0.5 * np.array(collider["size"], float) if collider["kind"] == "room" else None
-            points = solid(collider, self.folder).reshape(-1, 3) if half is None else \
-                half * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        for collider, triangles in zip(self.colliders, self.solids, strict=True):
+            points = triangles.reshape(-1, 3)
+            if collider["kind"] == "room":
+                points = 0.5 * np.array(collider["size"], float) * CORNERS
             if len(points) and np.linalg.norm(np.ptp(points, axis=0)) < 3 * self.scale:
-                for time in self.trajectory.time[frames]:
+                moves = collider.get("path") or collider.get("spin")
+                for time in self.trajectory.time[frames if moves else frames[:1]]:
                     yield placed(collider, time).of(points)
 
     def draw(self, frame: int) -> NDArray[np.uint8]:
         """(height, width, 3) pixels."""
         time = float(self.trajectory.time[frame])
-        grounds, casters = [], body_surfaces(self.trajectory, self.trajectory.positions(frame).astype(float), self.scale)
-        for collider in self.colliders:
+        positions = self.trajectory.positions(frame).astype(float)
+        found = body_surfaces(self.trajectory, positions, self.scale)
+        for collider, triangles in zip(self.colliders, self.solids, strict=True):
             if collider["kind"] == "plane":
-                grounds += ground(collider, time, self.camera.eye, self.centre, self.scale, BACKGROUND)
+                found += ground(collider, time, self.camera.eye, self.centre, self.scale, BACKGROUND)
             elif collider["kind"] == "room":
-                grounds += room(collider, time, self.camera.eye, self.scale)
+                found += room(collider, time, self.camera.eye, self.scale)
             else:
-                triangles = placed(collider, time).of(solid(collider, self.folder))
-                casters.append(surface(triangles, COLLIDER))
-        casters = [part for part in casters if len(part.triangles)]
-        image = paint(self.camera, grounds + casters, self.light)
-        return np.rint(255 * image.clip(0, 1)).astype(np.uint8)
+                found.append(surface(placed(collider, time).of(triangles), COLLIDER))
+        image = paint(self.camera, [part for part in found if len(part.triangles)], self.light)
+        return np.asarray(np.rint(255 * image.clip(0, 1)), np.uint8)
 
 
 def paint(camera: Camera, surfaces: list[Surface], light: Floats) -> Floats:
-    """(height, width, 3), 0 to 1: surfaces lit from `light`, their shadows on those that are not shaded."""
-    sky = np.linspace(0, 1, camera.height)[:, None, None]
-    image = np.broadcast_to(SKY[0] + sky * (SKY[1] - SKY[0]), (camera.height, camera.width, 3)).copy()
+    """(height, width, 3), 0 to 1: surfaces lit from `light`, and their shadows on the ground."""
+    image: Floats = np.broadcast_to(BACKGROUND, (camera.height, camera.width, 3)).copy()
     if surfaces:
         triangles = np.concatenate([part.triangles for part in surfaces])
-        colours = np.concatenate([shade(part, camera.eye, light) if part.shaded else part.colours for part in surfaces])
-        shaded = np.repeat([part.shaded for part in surfaces], [len(part.triangles) for part in surfaces])
         seen = visible(camera, triangles)
+        colours = np.concatenate([shade(part, camera.eye, light) if part.solid else part.colours for part in surfaces])
         image[seen != NOTHING] = colours[seen[seen != NOTHING]]
-        for plane in receivers(triangles[~shaded], light):
-            darken(image, camera, triangles[shaded], plane, on_plane(triangles, plane)[seen] & (seen != NOTHING), light)
-    return image.reshape(camera.height // FINE, FINE, camera.width // FINE, FINE, 3).mean(axis=(1, 3))
+        casters = np.concatenate([np.zeros((0, 3, 3)), *(part.triangles for part in surfaces if part.solid)])
+        first = np.cumsum([0, *(len(part.triangles) for part in surfaces)])
+        for k, part in enumerate(surfaces):
+            if part.normal is not None and part.normal @ light > 0.5:
+                here = (seen >= first[k]) & (seen < first[k + 1])
+                image[here] *= 1 - SHADOW_DEPTH * shadow(camera, casters, part, light)[here][:, None]
+    return np.asarray(image.reshape(camera.height // FINE, FINE, camera.width // FINE, FINE, 3).mean(axis=(1, 3)))
+
+
+def shadow(camera: Camera, casters: Floats, ground: Surface, light: Floats) -> Floats:
+    """(height, width) how far each pixel of a flat ground is in the shadow of `casters`, 0 to 1, with soft edges."""
+    from scipy.ndimage import gaussian_filter
+
+    normal = np.asarray(ground.normal)
+    above = (casters - ground.triangles[0, 0]) @ normal
+    cast = casters - (above / (normal @ light))[..., None] * light
+    covered = visible(camera, cast[(above > 0).any(axis=1)]) != NOTHING
+    return np.asarray(gaussian_filter(covered.astype(np.float32), SOFT))
 
 
 def shade(part: Surface, eye: Floats, light: Floats) -> Floats:
@@ -133,4 +147,48 @@ def shade(part: Surface, eye: Floats, light: Floats) -> Floats:
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     facing = (normal * view).sum(axis=1)
     lit = np.maximum(0, np.sign(facing) * (normal @ light))
-    return part.colours * (0.38 + 0.57 * lit + 0.15 * np.abs(facing))[:, None]
+    return np.asarray(part.colours * (0.36 + 0.66 * lit + 0.10 * np.abs(facing))[:, None])
+
+
+def label(pixels: NDArray[np.uint8], text: str) -> Any:
+    """A Pillow image of a frame with a text in its lower right corner."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(pixels)
+    font = ImageFont.load_default(0.045 * image.height)
+    spot = (0.97 * image.width, 0.96 * image.height)
+    ImageDraw.Draw(image).text(spot, text, fill=INK, font=font, anchor="rs")
+    return image
+
+
+def sheet(pictures: list[Any], title: str) -> Any:
+    """Pillow images side by side under a title, in about as many columns as rows."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    width, height = pictures[0].size
+    columns = min(len(pictures), int(np.ceil(np.sqrt(len(pictures)))))
+    rows = -(-len(pictures) // columns)
+    gap = 6
+    head = int(0.1 * height)
+    page = Image.new("RGB", (columns * (width + gap) + gap, head + rows * (height + gap)), "white")
+    font = ImageFont.load_default(0.055 * height)
+    ImageDraw.Draw(page).text((2 * gap, 0.5 * head), title, fill=INK, font=font, anchor="lm")
+    for number, picture in enumerate(pictures):
+        row, column = divmod(number, columns)
+        page.paste(picture, (gap + column * (width + gap), head + row * (height + gap)))
+    return page
+
+
+def animation(frames: list[Any], time: Floats, title: str, output: Path) -> None:
+    """Write a GIF that shows each picture as long as its time (s) lasts; a GIF counts hundredths of a second."""
+    from PIL import Image
+
+    # One palette for all frames, without dithering: what stands still does not flicker.
+    sample = Image.new("RGB", (frames[0].width, 3 * frames[0].height))
+    for place, frame in enumerate((frames[0], frames[len(frames) // 2], frames[-1])):
+        sample.paste(frame, (0, place * frame.height))
+    palette = sample.quantize(256, method=Image.Quantize.MEDIANCUT)
+    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    step = np.diff(time).mean() if len(time) > 1 else 1.0
+    frames[0].save(output, save_all=True, append_images=frames[1:], duration=max(20, round(100 * step) * 10), loop=0,
+                   comment=title.encode())

@@ -1,6 +1,7 @@
 """Bodies and colliders as coloured triangles, for pictures."""
 
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,17 +20,19 @@ WALL, FLOOR, WIRE = (0.83, 0.86, 0.90), (0.87, 0.87, 0.86), (0.42, 0.45, 0.50)
 
 
 class Surface(NamedTuple):
-    """Triangles (M, 3, 3) m and their colours (M, 3), 0 to 1. What is not `shaded` casts no shadow but takes them."""
+    """Triangles (M, 3, 3) m and their colours (M, 3), 0 to 1. What is `solid` is shaded and casts shadows, and what is
+    flat, of one `normal`, takes them."""
 
     triangles: Floats
     colours: Floats
-    shaded: bool = True
+    solid: bool = True
+    normal: Floats | None = None
 
 
-def surface(triangles: Floats, colour: ArrayLike, shaded: bool = True) -> Surface:
+def surface(triangles: Floats, colour: ArrayLike, solid: bool = True, normal: Floats | None = None) -> Surface:
     """Triangles (..., 3, 3) in one colour, or one each."""
     triangles = triangles.reshape(-1, 3, 3)
-    return Surface(triangles, np.broadcast_to(np.asarray(colour, float), (len(triangles), 3)), shaded)
+    return Surface(triangles, np.broadcast_to(np.asarray(colour, float), (len(triangles), 3)), solid, normal)
 
 
 @cache
@@ -39,14 +42,15 @@ def ball(levels: int) -> Floats:
     corners = np.array([[0, a, b * golden] for a in (-1, 1) for b in (-1, 1)], float)
     corners = np.concatenate([np.roll(corners, shift, axis=1) for shift in range(3)])
     near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1
-    found = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
-    faces = corners[np.array(found)] / np.linalg.norm(corners[0])
+    found = [(i, j, k) for i, j, k in combinations(range(12), 3) if near[i, j] and near[j, k] and near[i, k]]
+    faces: Floats = corners[np.array(found)] / np.linalg.norm(corners[0])
     for _ in range(levels):
         middle = faces + np.roll(faces, -1, axis=1)
         middle /= np.linalg.norm(middle, axis=2, keepdims=True)
         a, b, c = np.moveaxis(faces, 1, 0)
         ab, bc, ca = np.moveaxis(middle, 1, 0)
-        faces = np.stack([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))], 1).reshape(-1, 3, 3)
+        parts = (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)
+        faces = np.concatenate([np.stack(part, 1) for part in parts])
     return faces
 
 
@@ -103,12 +107,12 @@ def body_surfaces(trajectory: Trajectory, positions: Floats, scale: float) -> li
     for line in trajectory.lines:
         body, points = int(body_of(line[0])), positions[line]
         thick = radius(body, 0.003) if trajectory.bodies[body].kind == "rope" else 0.003 * scale
-        tube = np.concatenate([tubes(points[:-1], points[1:], thick).reshape(-1, 3, 3), dots(points, thick).reshape(-1, 3, 3)])
-        found.append(surface(tube, colours[body]))
-    for number, body in enumerate(trajectory.bodies):
-        if body.kind == "particles":
-            points = positions[body.first_particle:body.first_particle + body.particles]
-            levels = 2 if body.particles <= 100 else 1 if body.particles <= 2000 else 0
+        found.append(surface(tubes(points[:-1], points[1:], thick), colours[body]))
+        found.append(surface(dots(points, thick), colours[body]))
+    for number, entry in enumerate(trajectory.bodies):
+        if entry.kind == "particles":
+            points = positions[entry.first_particle:entry.first_particle + entry.particles]
+            levels = 2 if entry.particles <= 100 else 1 if entry.particles <= 2000 else 0
             found.append(surface(dots(points, radius(number, 0.009), levels), colours[number]))
     return found
 
@@ -145,7 +149,7 @@ def solid(collider: dict[str, Any], folder: Path) -> Floats:
                 grid(half * (sign * frames[axis] - frames[axis - 1] - frames[axis - 2]), 2 * half * frames[axis - 1],
                      2 * half * frames[axis - 2], 4).reshape(-1, 3, 3) for axis, sign in sides])
         case "sphere":
-            return collider["radius"] * ball(4)
+            return float(collider["radius"]) * ball(4)
         case "cylinder":
             axis = np.array(collider.get("axis", (0, 0, 1)), float)
             end = (0.5 * collider["length"] * axis / np.linalg.norm(axis))[None]
@@ -191,7 +195,7 @@ def ground(collider: dict[str, Any], time: float, eye: Floats, centre: Floats, s
     distance = np.linalg.norm(triangles.mean(axis=3) - middle, axis=3, keepdims=True)
     fade = np.clip((distance / scale - 0.9) / 1.2, 0, 1)
     colours = colours + fade * (background - colours)
-    return [Surface(triangles.reshape(-1, 3, 3), colours.reshape(-1, 3), False)]
+    return [Surface(triangles.reshape(-1, 3, 3), colours.reshape(-1, 3), False, normal)]
 
 
 def _round_number(size: float) -> float:
@@ -210,10 +214,11 @@ def room(collider: dict[str, Any], time: float, eye: Floats, scale: float) -> li
             corner = sign * frame[axis] * half
             if (eye - place.of(corner)) @ place.rotation @ frame[axis] * sign < 0:
                 wall = place.of(grid(corner - across_u - across_v, 2 * across_u, 2 * across_v, 24))
-                found.append(surface(wall, FLOOR if axis == 2 else WALL, shaded=False))
+                inward = -sign * place.rotation[:, axis]
+                found.append(surface(wall, FLOOR if axis == 2 else WALL, solid=False, normal=inward))
             for other in (-1, 1):
                 middle = corner + other * across_u
                 ends = place.of(np.stack([middle - across_v, middle + across_v]))
-                found.append(surface(tubes(ends[:1], ends[1:], 0.0015 * scale, 4), WIRE, shaded=False))
+                found.append(surface(tubes(ends[:1], ends[1:], 0.0015 * scale, 4), WIRE, solid=False))
     return found
 

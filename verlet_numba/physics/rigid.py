@@ -1,0 +1,32 @@
+"""Mass and inertia of a set of particles, and how it answers to an impulse as a whole. No orientation is needed.
+
+An impulse j n at the arm r from the centre of mass displaces the body by the translation j n / M and the rotation
+j I^-1 (r x n): its point at r moves along n by j (1/M + (r x n) . I^-1 (r x n)).
+"""
+
+from verlet_numba._jit import formula
+
+
+@formula
+def cross(ax, ay, az, bx, by, bz):
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@formula
+def inverse_symmetric(xx, yy, zz, xy, xz, yz):
+    """Inverse of the symmetric matrix [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], in the same order of entries.
+
+    A matrix without inverse (particles on one line) gives zeros: the body answers as if it could not turn.
+    """
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    determinant = xx * a + xy * b + xz * c
+    if not determinant > 1e-12 * xx * yy * zz:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    s = 1.0 / determinant
+    return a * s, (xx * zz - xz * xz) * s, (xx * yy - xy * xy) * s, b * s, c * s, (xy * xz - xx * yz) * s
+
+
+@formula
+def times_symmetric(xx, yy, zz, xy, xz, yz, x, y, z):
+    """Symmetric matrix times vector."""
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
