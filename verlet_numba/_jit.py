@@ -66,10 +66,24 @@ if not CACHE.exists():
 
 def kernel(function: Function) -> Function:
     """Compile `function` on first call: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
+    return _cached(function)
+
+
+def stage(function: Function) -> Function:
+    """Compile a stage of the frame loop as part of its caller.
+
+    Stages only call kernels. Every set of effects makes them anew, and each function that is compiled on its own costs
+    about a second then, whatever it holds.
+    """
+    return _cached(function, inline="always")
+
+
+def _cached(function: Function, **options: Any) -> Function:
+    """Numba reads its cache folder from its configuration while decorating, so that is where it is set."""
     before = config.CACHE_DIR
     config.CACHE_DIR = str(CACHE)
     try:
-        return numba.njit(cache=True, **FLAGS)(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, **FLAGS, **options)(function)  # type: ignore[no-any-return]
     finally:
         config.CACHE_DIR = before
 

@@ -4,7 +4,7 @@ An effect that the scene does not call for is None. Each phase gets that None as
 once; the compiler drops the branch, so the effect is no part of the machine code.
 """
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import kernel, stage
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
@@ -23,7 +23,7 @@ from verlet_numba.kernels.relax_angles import relax_angles
 OK, DIVERGED, FULL = 0, 1, 2
 
 
-@kernel
+@stage
 def accelerate(particles, effects, h):
     """What accelerates the particles: gravity, wind, drag, damping, each only if the scene calls for it."""
     fall(particles.acceleration, effects.gravity)
@@ -32,7 +32,7 @@ def accelerate(particles, effects, h):
     damp(particles, h, effects.damping)
 
 
-@kernel
+@stage
 def relax(world):
     """One pass over all constraints (P6-P10). Returns the number relaxed."""
     particles, solver = world.particles, world.solver
@@ -42,7 +42,7 @@ def relax(world):
     return relaxed
 
 
-@kernel
+@stage
 def substep(world):
     """One substep, from time number h to (number + 1) h. FULL: the contacts outgrew their buffers; grow and call again."""
     particles, effects, solver, clock = world.particles, world.effects, world.solver, world.clock
@@ -73,7 +73,7 @@ def substep(world):
     return OK
 
 
-@kernel
+@stage
 def finish(world, frames, f):
     """Frame f, now that the substep after it is done: positions, central differences, observables."""
     particles, snapshot, observed, h = world.particles, world.snapshot, world.observed, world.solver.step

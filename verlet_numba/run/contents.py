@@ -5,6 +5,7 @@ import platform
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,7 @@ def contents(prepared: Prepared, model: Model, command: str) -> Contents:
 
 def first_particles(bodies: list[Body]) -> list[int]:
     """Number in the file of each body's first particle."""
-    return np.cumsum([0, *(body.copies * len(body.shape.positions) for body in bodies)])[:-1].tolist()
+    return [0, *accumulate(body.copies * len(body.shape.positions) for body in bodies)][:-1]
 
 
 def stacked(parts: Iterable[Integers], width: int) -> Integers:

@@ -36,10 +36,11 @@ class OrderedFile:
     def write(self, data: memoryview) -> int:
         start, self.position = self.position, self.position + len(data)
         self.length = max(self.length, self.position)
-        if self.failure is None and start >= self.committed:
-            self._write_through(start, data)
-        else:
-            self._hold(start, bytes(data))
+        old = min(len(data), max(0, self.committed - start))       # bytes in front of the committed end
+        if old:
+            self._hold(start, bytes(data[:old]))
+        if old < len(data):
+            self._write_through(start + old, data[old:])
         return len(data)
 
     def readinto(self, buffer: memoryview) -> int:

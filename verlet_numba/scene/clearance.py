@@ -38,11 +38,8 @@ def clearance(collider: Collider, points: Floats, surface: Surface | None = None
 
 
 def origin(collider: Collider) -> Floats:
-    """Where a collider's own origin is at the start: as given, else where its path begins."""
-    given = collider.point if collider.kind == "plane" else collider.position
-    if collider.path and not {"point", "position"} & collider.model_fields_set:
-        given = collider.path[0][1:]
-    return np.asarray(given, float)
+    """Where a collider's own origin is at the start."""
+    return np.asarray(collider.point if collider.kind == "plane" else collider.position, float)
 
 
 def box_distance(points: Floats, size: ArrayLike) -> Floats:

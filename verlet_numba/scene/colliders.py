@@ -38,8 +38,6 @@ def solids(collider: Any) -> list[Solid]:
     """The surfaces of a collider: a room has six, every other kind one."""
     identity, far = np.eye(3), np.inf
     start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
-    if collider.path and not {"point", "position"} & collider.model_fields_set:
-        start = np.array(collider.path[0][1:], float)
     match collider.kind:
         case "plane":
             x, y, z = np.array(collider.normal, float) / np.linalg.norm(collider.normal)

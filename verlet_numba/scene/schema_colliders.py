@@ -1,8 +1,8 @@
 """The colliders of a scene, immovable or on a given path, one model a kind."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from .schema_common import (
     Direction,
@@ -31,6 +31,15 @@ class BaseCollider(Part):
         default=None, description="{static, dynamic} or one number for both; that of `effects` if left out")
     restitution: Fraction | None = Field(
         default=None, description="part of the normal speed that an impact gives back; that of `effects` if left out")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _start_on_path(cls, written: Any) -> Any:
+        place = "point" if "point" in cls.model_fields else "position"
+        path = written.get("path") if isinstance(written, dict) else None
+        if isinstance(path, list | tuple) and path and place not in written and isinstance(path[0], list | tuple):
+            return {**written, place: path[0][1:]}
+        return written
 
 
 class PlaneCollider(BaseCollider):

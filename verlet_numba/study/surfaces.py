@@ -99,7 +99,7 @@ def body_surfaces(trajectory: Trajectory, positions: Floats, scale: float) -> li
         return np.searchsorted(first, particle, side="right") - 1
 
     def radius(body: int, least: float) -> float:
-        entry = entries.get(trajectory.bodies[body].name, {})
+        entry = entries.get(trajectory.bodies[body].name.split(".")[0], {})     # copies are NAME.0, NAME.1 ...
         return max(least * scale, float(entry.get("radius") or 0.5 * (entry.get("thickness") or 0.0)))
 
     colours = PALETTE[np.arange(len(first)) % len(PALETTE)]

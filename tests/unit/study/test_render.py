@@ -170,7 +170,8 @@ def test_colliders_move_as_the_scene_says():
     np.testing.assert_allclose(place.origin, [-0.5, 0, 0.1])
     np.testing.assert_allclose(place.of(np.array([0.0, 1, 0])) - place.origin, [-np.sin(0.5), np.cos(0.5), 0])
     np.testing.assert_allclose(placed(spinning, 9.0).origin, [-0.4, 0, 0.1])
-    np.testing.assert_allclose(placed({"kind": "sphere", "path": [[0, 1, 2, 3], [1, 2, 2, 3]]}, 0.5).origin, [1.5, 2, 3])
+    started = {"kind": "sphere", "path": [[0, 1, 2, 3], [1, 2, 2, 3]]}
+    np.testing.assert_allclose(placed(started, 0.5).origin, [1.5, 2, 3])
 
 
 @pytest.mark.parametrize(("collider", "volume"), [

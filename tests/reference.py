@@ -1,0 +1,398 @@
+"""A naive twin of the simulator: one substep after another, particle by particle in the order of the file, in numpy.
+
+It knows no groups, runs or blocks and shares no formula with the package: it is written from the equations, to be
+read beside them. Slow, in double precision, without care for degenerate cases.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+# --- Constraints ------------------------------------------------------------------------------------------------------
+
+@dataclass
+class Stick:
+    i: int
+    j: int
+    rest: float
+    compliance: float
+    multiplier: float = 0.0
+
+
+def relaxation_order(shape):
+    """Numbers of a shape's sticks as they are relaxed: ropes even then odd; cloth diagonals, then along y, then along x."""
+    if shape.layout[0] == "line":
+        return [c for parity in (0, 1) for c, (i, _) in enumerate(shape.sticks) if i % 2 == parity]
+    if shape.layout[0] == "grid":
+        ny = shape.layout[2]
+        found = {}
+        for c, (a, b) in enumerate(shape.sticks):
+            step = (b // ny - a // ny, b % ny - a % ny)
+            found.setdefault((step, a // ny % 2, a % ny % 2), []).append(c)
+        return [c for step in ((-1, 1), (1, 1), (0, 1), (1, 0)) for row in (0, 1) for column in (0, 1)
+                for c in found.get((step, row, column), [])]
+    return list(range(len(shape.sticks)))
+
+
+def relax_stick(x, w, stick, h, tolerance=0.0, approximate=False):
+    """XPBD (Macklin et al. 2016, eq. 17-18) on rows x (N, 3), inverse masses w. Returns whether it was relaxed.
+
+    C = |d| - rest. Approximately (Jakobsen 2001): d (1 - 2 rest^2 / (d.d + rest^2)) in its place.
+    """
+    i, j = stick.i, stick.j
+    d = x[j] - x[i]
+    length = np.linalg.norm(d)
+    C = length - stick.rest
+    if approximate:
+        C = length * (1 - 2 * stick.rest**2 / (length**2 + stick.rest**2))
+    alpha = stick.compliance / h**2
+    if w[i] + w[j] == 0:
+        return False
+    if tolerance > 0:
+        off = abs(C + alpha * stick.multiplier) if stick.compliance else abs(length - stick.rest)
+        if off <= tolerance * stick.rest:
+            return False
+    change = -(C + alpha * stick.multiplier) / (w[i] + w[j] + alpha)
+    stick.multiplier += change
+    if length > 0:
+        x[i] -= w[i] * change * d / length
+        x[j] += w[j] * change * d / length
+    return True
+
+
+def relax_angle(x, w, corners, rest):
+    """One Gauss-Newton step on the angle at the middle particle: gradients n x u / a and n x v / b, n the plane's normal."""
+    i, j, k = corners
+    u, v = x[i] - x[j], x[k] - x[j]
+    normal = np.cross(u, v)
+    angle = np.arctan2(np.linalg.norm(normal), u @ v)
+    normal /= np.linalg.norm(normal)
+    at_i, at_k = -np.cross(normal, u) / (u @ u), np.cross(normal, v) / (v @ v)
+    gradients = {i: at_i, k: at_k, j: -at_i - at_k}
+    scale = (rest - angle) / sum(w[p] * (g @ g) for p, g in gradients.items())
+    for p, gradient in gradients.items():
+        x[p] += scale * w[p] * gradient
+
+
+# --- Forces -----------------------------------------------------------------------------------------------------------
+
+def wind_force(corners, velocities, wind, density):
+    """Force [N] on a triangle: density/2 area |u.n| (u.n) n."""
+    cross = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    area, normal = np.linalg.norm(cross) / 2, cross / np.linalg.norm(cross)
+    along = (wind - np.mean(velocities, axis=0)) @ normal
+    return density / 2 * area * abs(along) * along * normal
+
+
+def with_drag(a, displacement, air, linear, quadratic, h):
+    """Acceleration with drag at the velocity of the central difference; its speed by one fixed-point step."""
+    v = displacement / h
+    for _ in range(2):
+        k = linear + quadratic * np.linalg.norm(v - air)
+        # solves b = a - k (displacement/h + b h/2 - air) for b
+        b = (a - k * displacement / h + k * air) / (1 + k * h / 2)
+        v = displacement / h + b * h / 2
+    return b
+
+
+def with_damping(a, displacement, rate, h):
+    """The a' for which displacement + a' h^2 is the exact next displacement of v' = a - rate v."""
+    if rate == 0:
+        return a
+    decay = np.exp(-rate * h)
+    return (displacement * (decay - 1) + a * h / rate * (1 - decay)) / h**2
+
+
+# --- Colliders --------------------------------------------------------------------------------------------------------
+
+def turned(axis, angle):
+    """Rotation matrix about a unit axis: exp of its cross product matrix, by its eigenvectors (Rodrigues)."""
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def on_path(path, t):
+    return np.array([np.interp(t, path[:, 0], path[:, axis]) for axis in (1, 2, 3)])
+
+
+@dataclass
+class Solid:
+    """One surface: `distance` of a point in its own frame, with the outward normal there."""
+
+    collider: object
+    distance: object
+    start: np.ndarray
+
+    def pose(self, t):
+        """Origin and rotation at time t."""
+        origin, rotation = self.start, np.eye(3)
+        if self.collider.path:
+            path = np.array(self.collider.path, float)
+            origin = origin + on_path(path, t) - path[0, 1:]
+        if self.collider.spin:
+            axis = np.array(self.collider.spin.axis, float)
+            rotation = turned(axis / np.linalg.norm(axis), self.collider.spin.rate * t)
+        return origin, rotation
+
+
+def plane(normal, offset):
+    return lambda p: (normal @ p - offset, normal)
+
+
+def sphere(radius):
+    return lambda p: (np.linalg.norm(p) - radius, p / np.linalg.norm(p))
+
+
+def box(half):
+    def distance(p):
+        nearest = np.clip(p, -half, half)
+        if (nearest != p).any():
+            out = p - nearest
+            return np.linalg.norm(out), out / np.linalg.norm(out)
+        axis = np.argmin(half - np.abs(p))
+        return abs(p[axis]) - half[axis], np.copysign(np.eye(3)[axis], p)
+    return distance
+
+
+def cylinder(axis, radius, half):
+    def distance(p):
+        along = p @ axis
+        out = p - along * axis
+        beside = np.linalg.norm(out)
+        flat, normal = box(np.array([radius, half, np.inf]))(np.array([beside, along, 0.0]))
+        return flat, normal[0] * out / beside + normal[1] * axis
+    return distance
+
+
+def solids(collider):
+    unit = lambda vector: np.array(vector, float) / np.linalg.norm(vector)     # noqa: E731
+    start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
+    match collider.kind:
+        case "plane":
+            surfaces = [plane(unit(collider.normal), 0.0)]
+        case "room":
+            surfaces = [plane(-side * np.eye(3)[axis], -collider.size[axis] / 2) for axis in range(3) for side in (-1, 1)]
+        case "box":
+            surfaces = [box(np.array(collider.size) / 2)]
+        case "sphere":
+            surfaces = [sphere(collider.radius)]
+        case "cylinder":
+            surfaces = [cylinder(unit(collider.axis), collider.radius, collider.length / 2)]
+    return [Solid(collider, surface, start) for surface in surfaces]
+
+
+@dataclass
+class Contact:
+    """Particle k must stay on the upper side of a plane: normal . x >= bound."""
+
+    k: int
+    solid: Solid
+    normal: np.ndarray
+    bound: float
+    anchor: np.ndarray          # the particle's place at the start of the substep, carried along by the collider
+    push: float = 0.0
+    rebound: float = 0.0
+
+    def height(self, x):
+        return self.normal @ x[self.k] - self.bound
+
+    def approach(self, x):
+        return self.normal @ (x[self.k] - self.anchor)
+
+
+def find_contact(k, here, before, radius, solid, margin, t, h):
+    """The contact of a particle that was at `before` at t and is predicted at `here` at t + h, or None."""
+    (o, R), (o_before, R_before) = solid.pose(t + h), solid.pose(t)
+    local, local_before = R.T @ (here - o), R_before.T @ (before - o_before)
+    gap, normal = solid.distance(local)
+    if gap - radius >= margin:
+        return None
+    surface = local - gap * normal
+    if gap < 0 < solid.distance(local_before)[0]:        # came from outside: the surface that it was nearest to
+        gap, normal = solid.distance(local_before)
+        surface = local_before - gap * normal
+    return Contact(k, solid, R @ normal, (R @ normal) @ (o + R @ surface) + radius, o + R @ local_before)
+
+
+def impact(before, after, a, h, e):
+    """Gap and displacement at the end of a step in which a particle falls through gap 0 and rebounds (see below).
+
+    The path with constant acceleration through both gaps meets 0 after s; the flight from there is
+    g(tau) = e u tau + a tau^2/2, u the speed of impact. A flight shorter than a step is none: the particle rests.
+    """
+    v = (after - before) / h - a * h / 2
+    s = min(root.real for root in np.roots([a / 2, v, before]) if abs(root.imag) < 1e-9 * h and root.real > -1e-9 * h)
+    rise = -e * (v + a * s)
+    if rise <= 0 or rise + a * h / 2 <= 0:
+        return 0.0, 0.0
+    flight = lambda tau: rise * tau + a * tau**2 / 2     # noqa: E731
+    return flight(h - s), flight(h - s) - flight(-s)
+
+
+# --- The whole --------------------------------------------------------------------------------------------------------
+
+@dataclass
+class Twin:
+    """A scene and its bodies, simulated naively. x, previous: (N, 3) m in the order of the file."""
+
+    scene: object
+    bodies: list
+    number: int = 0                     # substeps done
+    contacts: list = field(default_factory=list)
+    relaxed: int = 0
+
+    def __post_init__(self):
+        scene, bodies = self.scene, self.bodies
+        self.h = 1 / (scene.time.frame_rate * scene.solver.substeps)
+        per_copy = [(body, copy) for body in bodies for copy in range(body.copies)]
+        sizes = [len(body.pinned) for body, _ in per_copy]
+        self.first = dict(zip([(id(body), copy) for body, copy in per_copy], np.cumsum([0, *sizes[:-1]]), strict=True))
+        joined = lambda values: np.concatenate(list(values)).astype(float)     # noqa: E731
+        self.x = joined(body.positions[copy] for body, copy in per_copy)
+        self.start = self.x.copy()
+        self.mass = joined(body.shape.masses for body, _ in per_copy)
+        self.free = ~joined(body.pinned for body, _ in per_copy).astype(bool)
+        self.w = np.where(self.free, 1 / self.mass, 0.0)
+        self.radius = joined(np.full(len(body.pinned), body.shape.radius) for body, _ in per_copy)
+        self.owner = [body for body, _ in per_copy for _ in range(len(body.pinned))]
+        velocity = joined(body.velocities[copy] for body, copy in per_copy) * self.free[:, None]
+        self.solids = [solid for collider in scene.colliders for solid in solids(collider)]
+        if scene.effects.contact == "none":
+            self.solids = []
+        self.find_constraints(per_copy)
+        self.previous = self.x - velocity * self.h
+        self.previous = self.x - velocity * self.h + self.acceleration() * self.h**2 / 2
+
+    def find_constraints(self, per_copy):
+        self.sticks, self.angles, self.triangles = [], [], []
+        for body, copy in per_copy:
+            first, shape = self.first[id(body), copy], body.shape
+            self.sticks += [Stick(*(first + shape.sticks[c]), shape.lengths[c], shape.compliance) for c in relaxation_order(shape)]
+            self.angles += [(first + corners, rest) for corners, rest in zip(shape.angles, shape.angle_values, strict=True)]
+            if shape.kind == "cloth":
+                self.triangles += list(first + shape.triangles)
+        self.observed = list(self.sticks)
+        start = {body.name: self.first[id(body), 0] for body in self.bodies}
+        self.sticks += [Stick(start[a] + i, start[b] + j, 0.0, 0.0) for a, i, b, j in self.scene.attachments]
+        rests = [stick.rest for stick in self.observed if stick.rest > 0]
+        self.margin = 0.05 * min(rests, default=0.0)
+
+    def acceleration(self):
+        effects, h = self.scene.effects, self.h
+        displacement = self.x - self.previous
+        a = np.zeros_like(self.x)
+        if effects.gravity:
+            a[self.free] = effects.gravity
+        air = np.zeros(3)
+        if effects.wind:
+            air = np.array(effects.wind.velocity)
+            for triangle in self.triangles:
+                force = wind_force(self.x[triangle], displacement[triangle] / h, air, effects.wind.density)
+                for p in triangle:
+                    a[p] += force / 3 * self.w[p]
+        for p in np.flatnonzero(self.free):
+            if effects.drag:
+                a[p] = with_drag(a[p], displacement[p], air, effects.drag.linear, effects.drag.quadratic, h)
+            if effects.damping:
+                a[p] = with_damping(a[p], displacement[p], effects.damping, h)
+        return a
+
+    def substep(self):
+        h, t, solver = self.h, self.number * self.h, self.scene.solver
+        a = self.acceleration()
+        self.x, self.previous = 2 * self.x - self.previous + a * h**2, self.x
+        self.carry(t + h)
+        found = (find_contact(k, self.x[k], self.previous[k], self.radius[k], solid, self.margin, t, h)
+                 for solid in self.solids for k in np.flatnonzero(self.free))
+        self.contacts = [contact for contact in found if contact]
+        self.foresee(a)
+        for stick in self.sticks:
+            stick.multiplier = 0.0
+        for _ in range(solver.iterations):
+            self.separate()
+            for stick in self.sticks:
+                self.relaxed += relax_stick(self.x, self.w, stick, h, solver.tolerance, solver.square_root == "approximate")
+            for corners, rest in self.angles:
+                relax_angle(self.x, self.w, corners, rest)
+                self.relaxed += 1
+        self.bounce()
+        self.rub()
+        self.number += 1
+
+    def carry(self, t):
+        for p, body in enumerate(self.owner):
+            if not self.free[p]:
+                self.x[p] = self.start[p]
+                if body.path is not None:
+                    self.x[p] += on_path(body.path, t) - body.path[0, 1:]
+
+    def separate(self):
+        for contact in self.contacts:
+            push = max(0.0, contact.push - contact.height(self.x))
+            self.x[contact.k] += (push - contact.push) * contact.normal
+            contact.push = push
+
+    def foresee(self, a):
+        for contact in self.contacts:
+            of_solid = contact.solid.collider.restitution
+            if of_solid is None:
+                of_solid = self.scene.effects.restitution or 0.0
+            e, after = max(self.owner[contact.k].restitution, of_solid), contact.height(self.x)
+            if e > 0 and after < 0:
+                before = max(0.0, after - contact.approach(self.x))
+                gap, contact.rebound = impact(before, after, contact.normal @ a[contact.k], self.h, e)
+                contact.bound += gap
+
+    def bounce(self):
+        for contact in self.contacts:
+            if contact.rebound > 0 and contact.push > 0:
+                excess = contact.approach(self.x) - contact.rebound
+                contact.push -= excess
+                self.previous[contact.k] += excess * contact.normal
+
+    def rub(self):
+        for contact in self.contacts:
+            of_solid = contact.solid.collider.friction or self.scene.effects.friction
+            if contact.push <= 0 or not of_solid:
+                continue
+            of_body = self.owner[contact.k].friction
+            static, dynamic = np.sqrt(of_body[0] * of_solid.static), np.sqrt(of_body[1] * of_solid.dynamic)
+            slide = self.x[contact.k] - contact.anchor
+            slide = slide - (slide @ contact.normal) * contact.normal
+            length = np.linalg.norm(slide)
+            if length <= static * contact.push:
+                self.x[contact.k] -= slide
+            elif length > 0:
+                self.x[contact.k] -= dynamic * contact.push * slide / length
+
+    def frames(self, count):
+        """The first `count` frames: positions and velocities (F, N, 3) and a dictionary of measures (F, ...) ."""
+        shown = [self.frame(after=self.scene.solver.substeps if f else 0) for f in range(count)]
+        positions, velocities, measures = zip(*shown, strict=True)
+        return np.array(positions), np.array(velocities), {key: np.array([m[key] for m in measures]) for key in measures[0]}
+
+    def frame(self, after):
+        """The frame so many substeps from the last. One more substep gives its velocities; that one stays done."""
+        for _ in range(after - 1):
+            self.substep()
+        x, before, t = self.x.copy(), self.previous.copy(), self.number * self.h
+        touching, relaxed, self.relaxed = sum(contact.push > 0 for contact in self.contacts), self.relaxed, 0
+        self.substep()
+        v = (self.x - before) / (2 * self.h)
+        return x, v, self.measures(x, v, t) | {"contacts": touching, "relaxations": relaxed}
+
+    def measures(self, x, v, t):
+        m = self.mass[:, None]
+        gravity = np.array(self.scene.effects.gravity or (0.0, 0.0, 0.0))
+        errors = [np.linalg.norm(x[s.j] - x[s.i]) / s.rest - 1 for s in self.observed if s.rest > 0]
+        inside = [self.radius[k] - solid.distance(R.T @ (x[k] - o))[0] for solid in self.solids
+                  for o, R in [solid.pose(t)] for k in np.flatnonzero(self.free)]
+        kinetic, potential = (m * v**2).sum() / 2, -(m * x * gravity).sum()
+        return {"kinetic_energy": kinetic, "potential_energy": potential, "total_energy": kinetic + potential,
+                "momentum": (m * v).sum(0), "angular_momentum": (m * np.cross(x, v)).sum(0),
+                "centre_of_mass": (m * x).sum(0) / m.sum(), "constraint_error_max": np.abs(errors).max(initial=0.0),
+                "constraint_error_rms": np.sqrt(np.mean(np.square(errors))) if errors else 0.0,
+                "penetration_max": max([0.0, *inside]), "speed_max": np.linalg.norm(v, axis=1).max()}

@@ -1,0 +1,42 @@
+"""Whole frames against the naive twin: every effect, every kind of body, constraint and collider together."""
+
+import numpy as np
+import pytest
+import worlds
+from reference import Twin
+
+from verlet_numba import buffers as b
+
+MEASURES = {"kinetic_energy": [b.KINETIC], "potential_energy": [b.POTENTIAL], "total_energy": [b.TOTAL],
+            "momentum": range(b.MOMENTUM, b.MOMENTUM + 3), "angular_momentum": range(b.ANGULAR, b.ANGULAR + 3),
+            "centre_of_mass": range(b.CENTRE, b.CENTRE + 3), "constraint_error_max": [b.ERROR_MAX],
+            "constraint_error_rms": [b.ERROR_RMS], "penetration_max": [b.PENETRATION], "speed_max": [b.SPEED_MAX],
+            "contacts": [b.CONTACTS], "relaxations": [b.RELAXATIONS]}
+
+
+@pytest.fixture(scope="module")
+def twin():
+    """The scene of everything, 24 frames on."""
+    return Twin(*worlds.placed(worlds.EVERYTHING)).frames(24)
+
+
+def test_every_frame_is_that_of_the_twin(twin):
+    positions, velocities, measures = worlds.advanced(worlds.started(worlds.EVERYTHING), 24)
+    np.testing.assert_allclose(positions, twin[0], atol=1e-9)
+    np.testing.assert_allclose(velocities, twin[1], atol=1e-6)
+    for name, columns in MEASURES.items():
+        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(24, -1), rtol=1e-6, atol=1e-6, err_msg=name)
+
+
+def test_the_scene_of_everything_calls_for_everything(twin):
+    """Else the test above could not fail."""
+    effects = worlds.started(worlds.EVERYTHING).world.effects
+    assert None not in effects
+    assert twin[2]["contacts"].max() >= 8
+    assert twin[2]["penetration_max"].max() > 1e-4
+
+
+def test_single_precision_follows_for_a_while(twin):
+    model = worlds.started(worlds.with_changes(worlds.EVERYTHING, solver={"precision": "float32"}))
+    positions, _, _ = worlds.advanced(model, 8)
+    np.testing.assert_allclose(positions, twin[0][:8], atol=3e-5)
