@@ -120,7 +120,7 @@ class Solids(NamedTuple):
     """Colliders. A room is six planes. Poses are those at the start and at the end of the current substep."""
 
     kind: Array                 # (K,) int 1; PLANE, BOX, SPHERE or CYLINDER
-    extent: Array               # (4, K) double m; plane: unit normal, offset; box: half edges; sphere: radius; cylinder: radius, half length
+    extent: Array               # (4, K) double m; plane: normal, offset; box: half edges; sphere: radius; cylinder: radius, half length
     origin: Array               # (3, K) double m; at the end of the substep
     rotation: Array             # (3, 3, K) double 1; columns are the axes, at the end of the substep
     origin_before: Array        # (3, K) double m
@@ -211,7 +211,7 @@ class Snapshot(NamedTuple):
 
     position: Array             # (3, n) real m
     before: Array               # (3, n) real m; one substep earlier
-    counts: Array               # (3,) int 1; relaxations since the last frame, contacts of its last substep, relaxations of the frame
+    counts: Array               # (3,) int 1; relaxations since the last frame; contacts and relaxations of the kept frame
 
 
 class World(NamedTuple):

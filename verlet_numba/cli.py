@@ -14,7 +14,7 @@ from verlet_numba import __version__
 
 FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
-SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key of the scene, e.g. solver.substeps=16.")
+SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings, no summary.")
 VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Say more about what is done.")
@@ -62,7 +62,8 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
 
     if verbose:
         say(f"{scene}: {len(prepared.bodies)} bodies, writing {output}")
-    summary = simulate(prepared, output, count=count, command=shlex.join(sys.argv), overwrite=overwrite, threads=threads, quiet=quiet)
+    summary = simulate(prepared, output, count=count, command=shlex.join(sys.argv), overwrite=overwrite, threads=threads,
+                       quiet=quiet)
     if as_json:
         print_json(summary.as_dict())
     elif not quiet:
@@ -214,8 +215,8 @@ def describe_plan(found: dict[str, Any]) -> Iterable[str]:
         yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<26}{phase['why']}"
     yield "groups:"
     for group in found["groups"]:
-        yield (f"  {group['copies']} x {group['kind']} of {group['particles_a_copy']} particles, {group['copies_a_block']} a block: "
-               f"{group['lanes']}")
+        yield (f"  {group['copies']} x {group['kind']} of {group['particles_a_copy']} particles, "
+               f"{group['copies_a_block']} a block: {group['lanes']}")
     yield "buffers:"
     for name, size in found["buffers"].items():
         yield f"  {size / 1e6:10.3f} MB  {name}"

@@ -25,12 +25,13 @@ def thrown(linear, quadratic, time):
     return solution.y[:2, -1]
 
 
-@pytest.mark.parametrize("substeps", [1, 4, 64])
-def test_free_fall_is_exact_at_every_step(simulate, substeps):
+@pytest.mark.parametrize(("substeps", "tolerance"), [(1, 1e-12), (4, 1e-12), (64, 1e-9)])
+def test_free_fall_is_exact_at_every_step(simulate, substeps, tolerance):
+    """Exact up to rounding, which grows with the square of the number of steps: sums of sums of it."""
     run = simulate(Path("validation/free_fall.yaml"), {"solver.substeps": substeps})
-    np.testing.assert_allclose(run.position[:, 0, 2], -G * run.time**2 / 2, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(run.velocity[:, 0, 2], -G * run.time, rtol=0, atol=1e-9)
-    assert run.position[-1, 0, 2] == pytest.approx(-4.905, rel=0, abs=1e-12)
+    np.testing.assert_allclose(run.position[:, 0, 2], -G * run.time**2 / 2, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(run.velocity[:, 0, 2], -G * run.time, rtol=0, atol=10 * tolerance)
+    assert run.position[-1, 0, 2] == pytest.approx(-4.905, rel=0, abs=tolerance)
 
 
 def test_throw_is_exact_in_every_direction(simulate):

@@ -12,7 +12,7 @@ H, OMEGA = 1.0, 0.05            # w h = 0.05
 
 @numba.njit
 def oscillate(position, previous, steps, energies, invariants):
-    """`steps` steps under a = -w^2 x; energies [J] of a unit mass from central-difference velocities, and the invariant."""
+    """`steps` steps under a = -w^2 x: energies [J] of a unit mass, from central differences, and what is conserved."""
     acceleration = np.zeros_like(position)
     for step in range(steps):
         x, before = position[0, 0], previous[0, 0]

@@ -7,7 +7,6 @@ particles leave by the face through which they came. Before every relaxation pas
 the push accumulated over the passes: a pass may take back what an earlier one gave too much, never pull.
 """
 
-import math
 
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import BOX, PLANE, SPHERE

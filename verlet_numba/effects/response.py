@@ -66,7 +66,8 @@ def lever(position, rigid, b, k, nx, ny, nz):
     rx, ry, rz = (position[0, k] - rigid.centre[0, b], position[1, k] - rigid.centre[1, b], position[2, k] - rigid.centre[2, b])
     tx, ty, tz = cross(rx, ry, rz, nx, ny, nz)
     inertia = rigid.inverse_inertia
-    ix, iy, iz = times_symmetric(inertia[0, b], inertia[1, b], inertia[2, b], inertia[3, b], inertia[4, b], inertia[5, b], tx, ty, tz)
+    ix, iy, iz = times_symmetric(inertia[0, b], inertia[1, b], inertia[2, b],
+                                 inertia[3, b], inertia[4, b], inertia[5, b], tx, ty, tz)
     return tx, ty, tz, ix, iy, iz, rigid.inverse_mass[b] + tx * ix + ty * iy + tz * iz
 
 

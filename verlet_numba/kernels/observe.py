@@ -113,7 +113,8 @@ def potential(row, position, order, mass, gravity):
         return
     for p in range(order.size):
         k = order[p]
-        row[POTENTIAL] -= mass[p] * (gravity[0, p] * position[0, k] + gravity[1, p] * position[1, k] + gravity[2, p] * position[2, k])
+        along = gravity[0, p] * position[0, k] + gravity[1, p] * position[1, k] + gravity[2, p] * position[2, k]
+        row[POTENTIAL] -= mass[p] * along
 
 
 @kernel

@@ -20,7 +20,7 @@ def impact(before, after, a, h, e):
     v = (after - before) / h - 0.5 * a * h
     root = math.sqrt(max(0.0, v * v - 2.0 * a * before))
     fall = root - v
-    s = min(h, 2.0 * before / fall) if fall > 0.0 else h
+    s = min(h, 2.0 * before / fall) if fall > 0.0 else 0.0
     leave = -e * (v + a * s)
     left = h - s
     if leave <= 0.0 or leave + 0.5 * a * h <= 0.0:

@@ -1,6 +1,5 @@
 """Air against a triangle: F = density/2 area |u.n| (u.n) n, u the air's velocity relative to the triangle, n its normal."""
 
-import math
 
 from verlet_numba._jit import formula
 

@@ -52,7 +52,8 @@ def build(scene: Scene, bodies: list[Body]) -> Model:
     inverse_mass = spread(numbering, [move / mass for move, mass in zip(moves, masses, strict=True)], size)
 
     effects = effects_of(scene, bodies, numbering, inverse_mass, real)
-    joined = constraints(bodies, numbering, attachments(scene, bodies, numbering), inverse_mass, step, scene.solver.iterations, real)
+    together = attachments(scene, bodies, numbering)
+    joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real)
     solver = Solver(step, scene.solver.substeps, scene.solver.iterations,
                     scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
     particles, snapshot = state(size, inverse_mass, effects, real)
@@ -85,7 +86,8 @@ def observed_of(scene: Scene, bodies: list[Body], numbering: Numbering) -> Obser
     """What observables need, in the order of the file."""
     order = numbering.scene_order
     mass = np.concatenate([np.zeros(0), *(np.tile(body.shape.masses, body.copies) for body in bodies)])
-    pairs = [index[:, body.shape.sticks.reshape(-1, 2)].reshape(-1, 2) for body, index in zip(bodies, numbering.bodies, strict=True)]
+    pairs = [index[:, body.shape.sticks.reshape(-1, 2)].reshape(-1, 2)
+             for body, index in zip(bodies, numbering.bodies, strict=True)]
     rest = [np.tile(body.shape.lengths, body.copies) for body in bodies]
     gravity = None
     if scene.effects.gravity is not None:

@@ -4,7 +4,37 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import BOX, CYLINDER, PLANE, SPHERE, Array, Carried, Contacts, Friction, Moving, Paths, Restitution, Rigid, Solids, gate
+from verlet_numba.buffers import (
+    BOX,
+    CYLINDER,
+    PLANE,
+    SPHERE,
+    Array,
+    Carried,
+    Contacts,
+    Friction,
+    Moving,
+    Paths,
+    Restitution,
+    Rigid,
+    Solids,
+    gate,
+)
+    BOX,
+    CYLINDER,
+    PLANE,
+    SPHERE,
+    Array,
+    Carried,
+    Contacts,
+    Friction,
+    Moving,
+    Paths,
+    Restitution,
+    Rigid,
+    Solids,
+    gate,
+)
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.schema import Scene
@@ -52,8 +82,8 @@ def solids(collider: Any) -> list[Solid]:
             return [Solid(SPHERE, (collider.radius, 0.0, 0.0, 0.0), start, identity, collider.radius, collider)]
         case "cylinder":
             half = 0.5 * collider.length
-            extent = (collider.radius, half, 0.0, 0.0)
-            return [Solid(CYLINDER, extent, start, turned_to(collider.axis), float(np.hypot(collider.radius, half)), collider)]
+            extent, reach = (collider.radius, half, 0.0, 0.0), float(np.hypot(collider.radius, half))
+            return [Solid(CYLINDER, extent, start, turned_to(collider.axis), reach, collider)]
     raise AssertionError(f"collider kind {collider.kind}")
 
 
@@ -118,14 +148,19 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_m
     if not scene.colliders or scene.effects.contact == "none" or not (inverse_mass > 0).any():
         return Contact(None, None, None, None, None)
     found, arrays = solids_of(scene)
+    size = len(inverse_mass)
+    radius = spread(numbering, [body.shape.radius for body in bodies], size)
+    rigid, body = rigid_of(bodies, numbering, size)
+    contact = Contacts(arrays, gate(radius, real), gate(body, np.int64), margin(bodies), gate(np.zeros(1), np.int64),
+                       *room(FIRST_ROOM))
+    return Contact(moving(found), contact, rigid, friction_of(scene, found, bodies, numbering, size, real),
+                   restitution_of(scene, found, bodies, numbering, size, real))
+
+
+def margin(bodies: list[Body]) -> float:
+    """How near a particle must come to a collider to be listed, m."""
     lengths = np.concatenate([np.zeros(0), *(body.shape.lengths for body in bodies)])
-    margin = MARGIN * float(lengths[lengths > 0].min(initial=0.0 if not (lengths > 0).any() else np.inf))
-    radius = spread(numbering, [np.full(index.shape, body.shape.radius) for body, index in zip(bodies, numbering.bodies, strict=True)],
-                    len(inverse_mass))
-    rigid, body = rigid_of(bodies, numbering, len(inverse_mass))
-    contact = Contacts(arrays, gate(radius, real), gate(body, np.int64), margin, gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
-    return Contact(moving(found), contact, rigid, friction_of(scene, found, bodies, numbering, len(inverse_mass), real),
-                   restitution_of(scene, found, bodies, numbering, len(inverse_mass), real))
+    return MARGIN * float(min(lengths[lengths > 0], default=0.0))
 
 
 def room(capacity: int) -> tuple[Array, ...]:
@@ -137,7 +172,8 @@ def room(capacity: int) -> tuple[Array, ...]:
 
 def rigid_of(bodies: list[Body], numbering: Numbering, size: int) -> tuple[Rigid | None, Integers]:
     """Rigid bodies without pins, and which of them each particle (n,) belongs to."""
-    whole = [(body, index) for body, index in zip(bodies, numbering.bodies, strict=True) if body.shape.rigid and not body.pinned.any()]
+    whole = [(body, index) for body, index in zip(bodies, numbering.bodies, strict=True)
+             if body.shape.rigid and not body.pinned.any()]
     belongs = np.full(size, -1, np.int64)
     if not whole:
         return None, belongs
@@ -153,32 +189,32 @@ def rigid_of(bodies: list[Body], numbering: Numbering, size: int) -> tuple[Rigid
 
 
 def spread(numbering: Numbering, values: list[Any], size: int) -> Floats:
-    """(size,) values (K, P) of every body at their inner indices, 0 for ghosts."""
+    """(size,) values of every body, a number or (K, P), at the inner indices of its particles; 0 for ghosts."""
     result = np.zeros(size)
     for index, value in zip(numbering.bodies, values, strict=True):
         result[index] = value
     return result
 
 
-def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, real: Any) -> Friction | None:
+def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int,
+                real: Any) -> Friction | None:
     """Coefficients of particles and surfaces; None if no two that may meet have any: they meet with sqrt(a b)."""
     default = scene.effects.friction
     pairs = [solid.collider.friction or default for solid in found]
     solid = np.array([[pair.static, pair.dynamic] if pair else [0.0, 0.0] for pair in pairs]).T
-    particle = np.stack([spread(numbering, [np.full(index.shape, body.friction[which]) for body, index
-                                            in zip(bodies, numbering.bodies, strict=True)], size) for which in range(2)])
+    particle = np.stack([spread(numbering, [body.friction[which] for body in bodies], size) for which in range(2)])
     if not particle.any() or not solid.any():
         return None
     return Friction(gate(particle, real), gate(solid, np.float64))
 
 
-def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, real: Any) -> Restitution | None:
+def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int,
+                   real: Any) -> Restitution | None:
     """Coefficients of particles and surfaces; None if all are 0: two that meet take the larger."""
     default = scene.effects.restitution or 0.0
     given = [solid.collider.restitution for solid in found]
     solid = np.array([default if value is None else value for value in given])
-    particle = spread(numbering, [np.full(index.shape, body.restitution) for body, index
-                                  in zip(bodies, numbering.bodies, strict=True)], size)
+    particle = spread(numbering, [body.restitution for body in bodies], size)
     if not particle.any() and not solid.any():
         return None
     return Restitution(gate(particle, real), gate(solid, np.float64), gate(np.zeros(FIRST_ROOM), np.float64))

@@ -50,14 +50,18 @@ def stick_parts(groups: list[Group], bodies: list[Body], numbering: Numbering, a
             shape = bodies[b].shape
             for index in numbering.bodies[b]:
                 ends = index[shape.sticks.reshape(-1, 2)].T
-                parts.append(Parts(ends, shape.lengths, np.full(len(shape.lengths), shape.compliance), np.zeros(len(shape.lengths), bool)))
-    count = len(attachments)
-    parts.append(Parts(attachments.reshape(-1, 2).T, np.zeros(count), np.zeros(count), np.zeros(count, bool)))
+                parts.append(plain(ends, shape.lengths, shape.compliance))
+    parts.append(plain(attachments.reshape(-1, 2).T, np.zeros(len(attachments)), 0.0))
     return stacked(parts)
 
 
+def plain(ends: Integers, rest: Floats, compliance: float) -> Parts:
+    """Constraints of which none is masked."""
+    return Parts(ends, rest, np.full(len(rest), compliance), np.zeros(len(rest), bool))
+
+
 def empty() -> Parts:
-    return Parts(np.zeros((2, 0), np.int64), np.zeros(0), np.zeros(0), np.zeros(0, bool))
+    return plain(np.zeros((2, 0), np.int64), np.zeros(0), 0.0)
 
 
 def stacked(parts: list[Parts]) -> Parts:

@@ -6,7 +6,6 @@ import numpy as np
 
 from verlet_numba.buffers import Damping, Drag, Gravity, Wind, gate
 from verlet_numba.scene.body import Body, Floats
-from verlet_numba.scene.constraints import per_copy
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.runs import joined, lanes
 from verlet_numba.scene.schema_effects import Effects
@@ -28,7 +27,8 @@ def drag(effects: Effects, inverse_mass: Floats, real: Any) -> Drag | None:
         return None
     moves = inverse_mass > 0
     air = None if effects.wind is None else lanes_of(effects.wind.velocity, moves, real)
-    return Drag(gate(np.where(moves, effects.drag.linear, 0.0), real), gate(np.where(moves, effects.drag.quadratic, 0.0), real), air)
+    linear, quadratic = (np.where(moves, rate, 0.0) for rate in (effects.drag.linear, effects.drag.quadratic))
+    return Drag(gate(linear, real), gate(quadratic, real), air)
 
 
 def damping(effects: Effects, inverse_mass: Floats, real: Any) -> Damping | None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from verlet_numba.buffers import COLUMNS, World
 from verlet_numba.scene.build import Model
+from verlet_numba.scene.numbering import Group
 from verlet_numba.scene.prepare import Prepared
 
 INTERPRETER = 160 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
@@ -30,8 +31,8 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
         "step_seconds": model.world.solver.step,
         "distance_constraints": len(model.world.observed.rest),
         "phases": [phase._asdict() for phase in phases(prepared, model)],
-        "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot), "copies_a_block": group.block,
-                    "lanes": lanes(model, g)} for g, group in enumerate(model.numbering.groups)],
+        "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot),
+                    "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
         "memory_bytes": INTERPRETER + total + 3 * chunk_bytes(model),
         "file_bytes_at_most": file_bytes(model)}
@@ -39,11 +40,11 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
 
 def frame_count(scene: Any) -> int:
     """Frames of the file, the start included."""
-    return int(round(scene.time.duration * scene.time.frame_rate)) + 1
+    return round(scene.time.duration * scene.time.frame_rate) + 1
 
 
-def lanes(model: Model, g: int) -> str:
-    group = model.numbering.groups[g]
+def lanes(model: Model, group: Group) -> str:
+    """How the sticks of a group are relaxed."""
     if not len(group.shape.sticks):
         return "no sticks"
     first, last = group.first, group.first + group.size
@@ -72,7 +73,8 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
     yield Phase("whole-body response", active.rigid is not None, "rigid bodies without pins meet colliders" if active.rigid
                 else "no rigid body without pins meets a collider")
-    yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other")
+    yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other"
+                if sum(body.copies for body in prepared.bodies) > 1 else "there is one body at most")
     yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))
     yield Phase("runs of sticks", world.runs is not None,
                 "ropes, cloth or several bodies of one kind" if world.runs else "no rope, no cloth, no body in several copies")

@@ -1,0 +1,27 @@
+"""Relaxation of angles against the naive twin."""
+
+import numpy as np
+import pytest
+from reference import relax_angle
+
+from verlet_numba.buffers import Angles
+from verlet_numba.kernels.relax_angles import relax_angles
+
+
+@pytest.mark.parametrize(("real", "tolerance"), [(np.float64, 1e-11), (np.float32, 1e-4)])
+def test_angles_are_the_twins(real, tolerance):
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(3, 12)).astype(real)
+    w = np.where(rng.random(12) < 0.2, 0, rng.uniform(0.2, 2, 12)).astype(real)
+    corners = np.array([rng.choice(12, 3, replace=False) for _ in range(9)])
+    rest = rng.uniform(0.3, 2.8, 9)
+    twin = x.T.astype(float)
+    for _ in range(2):
+        assert relax_angles(x, w, Angles(np.ascontiguousarray(corners.T), rest)) == 9
+        for c in range(9):
+            relax_angle(twin, w.astype(float), corners[c], rest[c])
+    np.testing.assert_allclose(x.T, twin, atol=tolerance)
+
+
+def test_no_angles_are_nothing():
+    assert relax_angles(np.ones((3, 1)), np.ones(1), None) == 0
