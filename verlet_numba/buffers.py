@@ -120,7 +120,7 @@ class Solids(NamedTuple):
     """Colliders. A room is six planes. Poses are those at the start and at the end of the current substep."""
 
     kind: Array                 # (K,) int 1; PLANE, BOX, SPHERE or CYLINDER
-    extent: Array               # (4, K) double m; plane: normal, offset; box: half edges; sphere: radius; cylinder: radius, half length
+    extent: Array               # (4, K) double m; plane: normal, offset; box: half edges; else radius, half length
     origin: Array               # (3, K) double m; at the end of the substep
     rotation: Array             # (3, 3, K) double 1; columns are the axes, at the end of the substep
     origin_before: Array        # (3, K) double m

@@ -20,21 +20,6 @@ from verlet_numba.buffers import (
     Solids,
     gate,
 )
-    BOX,
-    CYLINDER,
-    PLANE,
-    SPHERE,
-    Array,
-    Carried,
-    Contacts,
-    Friction,
-    Moving,
-    Paths,
-    Restitution,
-    Rigid,
-    Solids,
-    gate,
-)
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.schema import Scene
@@ -184,7 +169,8 @@ def rigid_of(bodies: list[Body], numbering: Numbering, size: int) -> tuple[Rigid
         belongs[start:start + step * count:step] = b
     total = len(first)
     whole_numbers = [gate(array, np.int64) for array in (first, stride, counts, np.full(total, -1), np.zeros(total), np.zeros(1))]
-    doubles = [gate(np.zeros(shape), np.float64) for shape in (total, (3, total), (6, total), FIRST_ROOM, FIRST_ROOM, (3, FIRST_ROOM))]
+    shapes = (total, (3, total), (6, total), FIRST_ROOM, FIRST_ROOM, (3, FIRST_ROOM))
+    doubles = [gate(np.zeros(shape), np.float64) for shape in shapes]
     return Rigid(*whole_numbers, *doubles), belongs
 
 
