@@ -4,7 +4,7 @@ An effect that the scene does not call for is None. Each phase gets that None as
 once; the compiler drops the branch, so the effect is no part of the machine code.
 """
 
-from verlet_numba._jit import kernel, stage
+from verlet_numba._jit import inlined, kernel
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
@@ -23,16 +23,16 @@ from verlet_numba.kernels.relax_angles import relax_angles
 OK, DIVERGED, FULL = 0, 1, 2
 
 
-@stage
+@inlined
 def accelerate(particles, effects, h):
     """What accelerates the particles: gravity, wind, drag, damping, each only if the scene calls for it."""
     fall(particles.acceleration, effects.gravity)
-    blow(particles, h, effects.wind)
-    resist(particles, h, effects.drag)
-    damp(particles, h, effects.damping)
+    blow(particles.position, particles.previous, particles.acceleration, h, effects.wind)
+    resist(particles.position, particles.previous, particles.acceleration, h, effects.drag)
+    damp(particles.position, particles.previous, particles.acceleration, h, effects.damping)
 
 
-@stage
+@inlined
 def relax(world):
     """One pass over all constraints (P6-P10). Returns the number relaxed."""
     particles, solver = world.particles, world.solver
@@ -42,38 +42,38 @@ def relax(world):
     return relaxed
 
 
-@stage
+@inlined
 def substep(world):
     """One substep, from time number h to (number + 1) h. FULL: the contacts outgrew their buffers; grow and call again."""
     particles, effects, solver, clock = world.particles, world.effects, world.solver, world.clock
-    contact, h = effects.contact, solver.step
+    position, previous, contact, h = particles.position, particles.previous, effects.contact, solver.step
     if clock[STAGE] == WHOLE:
         end = (clock[NUMBER] + 1) * h
         accelerate(particles, effects, h)
-        integrate(particles.position, particles.previous, particles.acceleration, h)   # Verlet (P5)
-        carry(particles.position, end, effects.carried)
+        integrate(position, previous, particles.acceleration, h)        # Verlet (P5)
+        carry(position, end, effects.carried)
         move(contact, end, effects.moving)
         clock[STAGE] = INTEGRATED
-    if not find_contacts(particles, contact):
+    if not find_contacts(position, previous, particles.inverse_mass, contact):
         return FULL
-    gather(particles, contact, effects.rigid)
-    foresee(particles, contact, effects.restitution, h)
+    gather(position, particles.inverse_mass, contact, effects.rigid)
+    foresee(position, particles.acceleration, contact, effects.restitution, h)
     forget(world.runs_softness)
     forget(world.sticks_softness)
     for _ in range(solver.passes):
-        separate(particles.position, contact)          # before every pass (P18): last or once only holds less
-        shove(particles, contact, effects.rigid)
+        separate(position, contact)                    # before every pass (P18): last or once only holds less
+        shove(position, particles.inverse_mass, contact, effects.rigid)
         world.snapshot.counts[0] += relax(world)
-    bounce(particles, contact, effects.restitution)
-    rebound(particles, contact, effects.restitution, effects.rigid)
-    rub(particles.position, contact, effects.friction)
-    rub_bodies(particles, contact, effects.friction, effects.rigid)
+    bounce(position, previous, contact, effects.restitution)
+    rebound(position, previous, particles.inverse_mass, contact, effects.restitution, effects.rigid)
+    rub(position, contact, effects.friction)
+    rub_bodies(position, particles.inverse_mass, contact, effects.friction, effects.rigid)
     clock[NUMBER] += 1
     clock[STAGE] = WHOLE
     return OK
 
 
-@stage
+@inlined
 def finish(world, frames, f):
     """Frame f, now that the substep after it is done: positions, central differences, observables."""
     particles, snapshot, observed, h = world.particles, world.snapshot, world.observed, world.solver.step

@@ -5,10 +5,12 @@ it must not go below, from the particle's predicted place. Where the prediction 
 that the particle met first, judged from its place at the start of the substep in the collider's own frame: fast
 particles leave by the face through which they came. Before every relaxation pass the contacts are separated, with
 the push accumulated over the passes: a pass may take back what an earlier one gave too much, never pull.
+
+Loops over particles and contacts work on arrays that are taken out of their buffers before: a buffer that is passed or
+read within a loop has the references of its arrays counted each time, which costs ten times the work.
 """
 
-
-from verlet_numba._jit import kernel
+from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.buffers import BOX, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
 from verlet_numba.physics.solids import box, cylinder, plane, sphere
@@ -16,92 +18,110 @@ from verlet_numba.physics.solids import box, cylinder, plane, sphere
 BATCH = 128
 
 
-@kernel
-def surface(solids, s, x, y, z):
-    """Signed distance from the surface of solid s [m] and the outward normal, in its own frame."""
-    kind, extent = solids.kind[s], solids.extent
+@formula
+def surface(kind, extent, x, y, z):
+    """Signed distance from the surface of a solid [m] and the outward normal, in its own frame."""
     if kind == PLANE:
-        return plane(x, y, z, extent[0, s], extent[1, s], extent[2, s], extent[3, s])
+        return plane(x, y, z, extent[0], extent[1], extent[2], extent[3])
     if kind == BOX:
-        return box(x, y, z, extent[0, s], extent[1, s], extent[2, s])
+        return box(x, y, z, extent[0], extent[1], extent[2])
     if kind == SPHERE:
-        return sphere(x, y, z, extent[0, s])
-    return cylinder(x, y, z, extent[0, s], extent[1, s])
+        return sphere(x, y, z, extent[0])
+    return cylinder(x, y, z, extent[0], extent[1])
+
+
+@inlined
+def pose_of(origin, rotation, s):
+    """The pose of solid s."""
+    return (origin[0, s], origin[1, s], origin[2, s],
+            rotation[0, 0, s], rotation[0, 1, s], rotation[0, 2, s],
+            rotation[1, 0, s], rotation[1, 1, s], rotation[1, 2, s],
+            rotation[2, 0, s], rotation[2, 1, s], rotation[2, 2, s])
+
+
+@inlined
+def extent_of(extent, s):
+    """The extent of solid s."""
+    return extent[0, s], extent[1, s], extent[2, s], extent[3, s]
 
 
 @kernel
-def find_contacts(particles, contact):
+def find_contacts(position, previous, inverse_mass, contact):
     """List the particles within the margin of a collider. False: more than there is room for (grow and call again)."""
     if contact is None:
         return True
     contact.listed[0] = 0
-    solids, n = contact.solids, particles.inverse_mass.size
-    for s in range(solids.kind.size):
-        for first in range(0, n, BATCH):
-            last = min(n, first + BATCH)
-            if not any_near(particles.position[:, first:last], contact.radius[first:last], solids, s, contact.margin):
-                continue
-            for k in range(first, last):
-                if particles.inverse_mass[k] > 0 and not list_contact(particles, contact, k, s):
-                    return False
+    for s in range(contact.solids.kind.size):
+        if not list_contacts(position, previous, inverse_mass, contact, s):
+            return False
     return True
 
 
 @kernel
-def any_near(position, radius, solids, s, margin):
-    """Whether any particle of a batch comes near solid s: below its plane, or within the sphere that holds it."""
-    x, y, z = position[0], position[1], position[2]
-    ox, oy, oz = solids.origin[0, s], solids.origin[1, s], solids.origin[2, s]
+def list_contacts(position, previous, inverse_mass, contact, s):
+    """List the contacts of solid s, passing over batches of particles that are far from it. False: no room."""
+    solids, radii, margin, room = contact.solids, contact.radius, contact.margin, contact.particle.size
+    kind, extent, reach = solids.kind[s], extent_of(solids.extent, s), solids.reach[s]
+    pose, earlier = pose_of(solids.origin, solids.rotation, s), pose_of(solids.origin_before, solids.rotation_before, s)
+    particle, solid, push = contact.particle, contact.solid, contact.push
+    normal, bound, anchor = contact.normal, contact.bound, contact.anchor
+    x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
+    c = contact.listed[0]
+    for first in range(0, inverse_mass.size, BATCH):
+        last = min(inverse_mass.size, first + BATCH)
+        if not any_near(x[first:last], y[first:last], z[first:last], radii[first:last], kind, extent, pose, reach, margin):
+            continue
+        for k in range(first, last):
+            px, py, pz = inward(x[k], y[k], z[k], pose)
+            gap, nx, ny, nz = surface(kind, extent, px, py, pz)
+            if gap - radii[k] >= margin or not inverse_mass[k] > 0:
+                continue
+            if c == room:
+                return False
+            qx, qy, qz = inward(u[k], v[k], w[k], earlier)
+            gap, nx, ny, nz = entered(kind, extent, px, py, pz, qx, qy, qz, gap, nx, ny, nz)
+            level = nx * px + ny * py + nz * pz - gap + radii[k]
+            nx, ny, nz = outward(nx, ny, nz, pose)
+            qx, qy, qz = outward(qx, qy, qz, pose)
+            particle[c], solid[c], push[c] = k, s, 0.0
+            normal[0, c], normal[1, c], normal[2, c] = nx, ny, nz
+            bound[c] = level + nx * pose[0] + ny * pose[1] + nz * pose[2]
+            anchor[0, c], anchor[1, c], anchor[2, c] = qx + pose[0], qy + pose[1], qz + pose[2]
+            c += 1
+    contact.listed[0] = c
+    return True
+
+
+@kernel
+def any_near(x, y, z, radii, kind, extent, pose, reach, margin):
+    """Whether any particle of a batch comes near a solid: below its plane, or within the sphere that holds it."""
     near = 0
-    if solids.kind[s] == PLANE:
-        nx, ny, nz = outward(solids.extent[0, s], solids.extent[1, s], solids.extent[2, s], solids.rotation, s)
-        bound = solids.extent[3, s] + margin + nx * ox + ny * oy + nz * oz
+    if kind == PLANE:
+        nx, ny, nz = outward(extent[0], extent[1], extent[2], pose)
+        bound = extent[3] + margin + nx * pose[0] + ny * pose[1] + nz * pose[2]
         for k in range(x.size):
-            near += nx * x[k] + ny * y[k] + nz * z[k] < bound + radius[k]
+            near += nx * x[k] + ny * y[k] + nz * z[k] < bound + radii[k]
     else:
-        reach = solids.reach[s] + margin
         for k in range(x.size):
-            dx, dy, dz, far = x[k] - ox, y[k] - oy, z[k] - oz, reach + radius[k]
+            dx, dy, dz, far = x[k] - pose[0], y[k] - pose[1], z[k] - pose[2], reach + margin + radii[k]
             near += dx * dx + dy * dy + dz * dz < far * far
     return near > 0
 
 
-@kernel
-def list_contact(particles, contact, k, s):
-    """Make a contact of particle k and solid s if they are near. False: no room."""
-    solids, here, before = contact.solids, particles.position, particles.previous
-    x, y, z = inward(here[0, k], here[1, k], here[2, k], solids.origin, solids.rotation, s)
-    gap, nx, ny, nz = surface(solids, s, x, y, z)
-    radius = contact.radius[k]
-    if gap - radius >= contact.margin:
-        return True
-    c = contact.listed[0]
-    if c == contact.particle.size:
-        return False
-    u, v, w = inward(before[0, k], before[1, k], before[2, k], solids.origin_before, solids.rotation_before, s)
+@formula
+def entered(kind, extent, px, py, pz, qx, qy, qz, gap, nx, ny, nz):
+    """Gap and normal at p; inside, but come from q outside: those of the plane through the surface point nearest to q."""
     if gap < 0.0:
-        start, mx, my, mz = surface(solids, s, u, v, w)
-        if start > 0.0:  # came from outside: the plane through the surface point that it was nearest to
-            nx, ny, nz = mx, my, mz
-            gap = start + nx * (x - u) + ny * (y - v) + nz * (z - w)
-    level = nx * x + ny * y + nz * z - gap + radius
-    nx, ny, nz = outward(nx, ny, nz, solids.rotation, s)
-    contact.listed[0] = c + 1
-    contact.particle[c], contact.solid[c], contact.push[c] = k, s, 0.0
-    contact.normal[0, c], contact.normal[1, c], contact.normal[2, c] = nx, ny, nz
-    ox, oy, oz = solids.origin[0, s], solids.origin[1, s], solids.origin[2, s]
-    contact.bound[c] = level + nx * ox + ny * oy + nz * oz
-    u, v, w = outward(u, v, w, solids.rotation, s)
-    contact.anchor[0, c], contact.anchor[1, c], contact.anchor[2, c] = u + ox, v + oy, w + oz
-    return True
+        start, mx, my, mz = surface(kind, extent, qx, qy, qz)
+        if start > 0.0:
+            return start + mx * (px - qx) + my * (py - qy) + mz * (pz - qz), mx, my, mz
+    return gap, nx, ny, nz
 
 
-@kernel
-def height(place, contact, c):
-    """How far along contact c's normal `position` stands above its bound [m]; negative: penetration."""
-    k = contact.particle[c]
-    return (contact.normal[0, c] * place[0, k] + contact.normal[1, c] * place[1, k]
-            + contact.normal[2, c] * place[2, k]) - contact.bound[c]
+@formula
+def risen(normal, c, x, y, z):
+    """The vector (x, y, z) along the normal of contact c [m]."""
+    return normal[0, c] * x + normal[1, c] * y + normal[2, c] * z
 
 
 @kernel
@@ -109,15 +129,19 @@ def separate(position, contact):
     """Move every penetrating particle out to its plane; take back what an earlier pass of this substep gave too much."""
     if contact is None:
         return
+    particle, body, push = contact.particle, contact.body, contact.push
+    normal, bound = contact.normal, contact.bound
+    x, y, z = position[0], position[1], position[2]
     for c in range(contact.listed[0]):
-        k, given = contact.particle[c], contact.push[c]
-        if contact.body[k] >= 0:        # answers as a whole (effects/response.py)
+        k, given = particle[c], push[c]
+        if body[k] >= 0:        # answers as a whole (effects/response.py)
             continue
-        push = max(0.0, given - height(position, contact, c))
-        if push != given:
-            for axis in range(3):
-                position[axis, k] += (push - given) * contact.normal[axis, c]
-            contact.push[c] = push
+        total = max(0.0, given - (risen(normal, c, x[k], y[k], z[k]) - bound[c]))
+        if total != given:
+            push[c] = total
+            x[k] += (total - given) * normal[0, c]
+            y[k] += (total - given) * normal[1, c]
+            z[k] += (total - given) * normal[2, c]
 
 
 @kernel
@@ -125,13 +149,15 @@ def penetration(position, inverse_mass, contact):
     """The deepest penetration of any particle [m] into any collider in its pose before this substep; 0 if none."""
     if contact is None:
         return 0.0
-    solids, deepest = contact.solids, 0.0
+    solids, radii, deepest = contact.solids, contact.radius, 0.0
+    x, y, z = position[0], position[1], position[2]
     for s in range(solids.kind.size):
+        kind, extent = solids.kind[s], extent_of(solids.extent, s)
+        pose = pose_of(solids.origin_before, solids.rotation_before, s)
         for k in range(inverse_mass.size):
             if inverse_mass[k] > 0:
-                x, y, z = inward(position[0, k], position[1, k], position[2, k], solids.origin_before, solids.rotation_before, s)
-                gap = surface(solids, s, x, y, z)[0]
-                deepest = max(deepest, contact.radius[k] - gap)
+                px, py, pz = inward(x[k], y[k], z[k], pose)
+                deepest = max(deepest, radii[k] - surface(kind, extent, px, py, pz)[0])
     return deepest
 
 
@@ -140,7 +166,7 @@ def touching(contact):
     """The number of contacts that have pushed in this substep."""
     if contact is None:
         return 0
-    pushed = 0
+    push, pushed = contact.push, 0
     for c in range(contact.listed[0]):
-        pushed += contact.push[c] > 0.0
+        pushed += push[c] > 0.0
     return pushed

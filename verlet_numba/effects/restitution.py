@@ -4,57 +4,57 @@ Before the passes, an impact's plane is raised to where the rebound ends within 
 position is moved so that the particle leaves with the rebound's displacement; that too is a push for friction.
 """
 
-from verlet_numba._jit import kernel
-from verlet_numba.effects.contact import height
+from verlet_numba._jit import inlined, kernel
+from verlet_numba.effects.contact import risen
 from verlet_numba.physics.restitution import impact
 
 
 @kernel
-def foresee(particles, contact, restitution, h):
+def foresee(position, acceleration, contact, restitution, h):
     """Find the contacts that hit in this substep and raise their bound to the rebound's end."""
     if restitution is None:
         return
+    particle, solid, normal, bound, anchor = contact.particle, contact.solid, contact.normal, contact.bound, contact.anchor
+    own, other, rebound = restitution.particle, restitution.solid, restitution.rebound
+    x, y, z = position[0], position[1], position[2]
     for c in range(contact.listed[0]):
-        k, s = contact.particle[c], contact.solid[c]
-        restitution.rebound[c] = 0.0
-        share = max(float(restitution.particle[k]), restitution.solid[s])
-        after = height(particles.position, contact, c)
+        k = particle[c]
+        rebound[c] = 0.0
+        share = max(other[solid[c]], own[k])
+        after = risen(normal, c, x[k], y[k], z[k]) - bound[c]
         if share > 0.0 and after < 0.0:
-            before = max(0.0, after - approach(particles.position, contact, c))
-            pull = normal_acceleration(particles.acceleration, contact, c)
-            gap, restitution.rebound[c] = impact(before, after, pull, h, share)
-            contact.bound[c] += gap
+            before = max(0.0, after - approach(normal, anchor, c, x[k], y[k], z[k]))
+            gap, rebound[c] = impact(before, after, pull_along(acceleration, normal, c, k), h, share)
+            bound[c] += gap
+
+
+@inlined
+def approach(normal, anchor, c, x, y, z):
+    """Displacement of the point (x, y, z) along the normal in this substep [m], relative to the collider; negative: nearer."""
+    return risen(normal, c, x - anchor[0, c], y - anchor[1, c], z - anchor[2, c])
 
 
 @kernel
-def approach(position, contact, c):
-    """Displacement along the normal in this substep [m], relative to the collider; negative: nearer."""
-    k, total = contact.particle[c], 0.0
-    for axis in range(3):
-        total += contact.normal[axis, c] * (position[axis, k] - contact.anchor[axis, c])
-    return total
-
-
-@kernel
-def normal_acceleration(acceleration, contact, c):
-    """Acceleration along the normal of contact c [m/s^2]."""
+def pull_along(acceleration, normal, c, k):
+    """Acceleration of particle k along the normal of contact c [m/s^2]."""
     if acceleration is None:
         return 0.0
-    k, total = contact.particle[c], 0.0
-    for axis in range(3):
-        total += contact.normal[axis, c] * acceleration[axis, k]
-    return total
+    return risen(normal, c, acceleration[0, k], acceleration[1, k], acceleration[2, k])
 
 
 @kernel
-def bounce(particles, contact, restitution):
-    """Give what hit the displacement that it leaves with, by moving its previous position along the normal."""
+def bounce(position, previous, contact, restitution):
+    """Give what hit, and answers alone, the displacement that it leaves with, by moving its previous position."""
     if restitution is None:
         return
+    particle, body, push, normal, anchor = contact.particle, contact.body, contact.push, contact.normal, contact.anchor
+    rebound = restitution.rebound
+    x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     for c in range(contact.listed[0]):
-        k = contact.particle[c]
-        if restitution.rebound[c] > 0.0 and contact.push[c] > 0.0 and contact.body[k] < 0:
-            excess = approach(particles.position, contact, c) - restitution.rebound[c]
-            contact.push[c] -= excess
-            for axis in range(3):
-                particles.previous[axis, k] += excess * contact.normal[axis, c]
+        k = particle[c]
+        if rebound[c] > 0.0 and push[c] > 0.0 and body[k] < 0:
+            excess = approach(normal, anchor, c, x[k], y[k], z[k]) - rebound[c]
+            push[c] -= excess
+            u[k] += excess * normal[0, c]
+            v[k] += excess * normal[1, c]
+            w[k] += excess * normal[2, c]

@@ -5,16 +5,13 @@ from verlet_numba.physics.wind import pressure
 
 
 @kernel
-def blow(particles, h, wind):
-    """Add the wind's force to what accelerates the particles so far; a triangle's velocity is the mean of its corners'."""
+def blow(position, previous, acceleration, h, wind):
+    """Add the wind's force to what accelerates the particles so far; a triangle's velocity is the mean of its corners'.
+
+    Triangles of a run share no particle, so they are lanes of one vector loop.
+    """
     if wind is None:
         return
-    blow_runs(particles.position, particles.previous, particles.acceleration, h, wind)
-
-
-@kernel
-def blow_runs(position, previous, acceleration, h, wind):
-    """Triangles of a run share no particle, so they are lanes of one vector loop."""
     x, y, z = position[0], position[1], position[2]
     u, v, w = previous[0], previous[1], previous[2]
     a, b, c = acceleration[0], acceleration[1], acceleration[2]

@@ -51,7 +51,7 @@ def record_velocity(output, f, position, before, order, h):
     for p in range(order.size):
         k = order[p]
         for axis in range(3):
-            output[f, p, axis] = (float(position[axis, k]) - before[axis, k]) * scale
+            output[f, p, axis] = (np.float64(position[axis, k]) - before[axis, k]) * scale
 
 
 @kernel
@@ -82,10 +82,10 @@ def energies(row, position, snapshot, observed, h):
     total, fastest, scale = 0.0, 0.0, 0.5 / h
     for p in range(observed.scene_order.size):
         k, m = observed.scene_order[p], observed.mass[p]
-        x, y, z = float(snapshot.position[0, k]), float(snapshot.position[1, k]), float(snapshot.position[2, k])
-        u = (float(position[0, k]) - snapshot.before[0, k]) * scale
-        v = (float(position[1, k]) - snapshot.before[1, k]) * scale
-        w = (float(position[2, k]) - snapshot.before[2, k]) * scale
+        x, y, z = np.float64(snapshot.position[0, k]), np.float64(snapshot.position[1, k]), np.float64(snapshot.position[2, k])
+        u = (np.float64(position[0, k]) - snapshot.before[0, k]) * scale
+        v = (np.float64(position[1, k]) - snapshot.before[1, k]) * scale
+        w = (np.float64(position[2, k]) - snapshot.before[2, k]) * scale
         square = u * u + v * v + w * w
         row[KINETIC] += 0.5 * m * square
         fastest = max(fastest, square)
@@ -125,7 +125,7 @@ def constraint_errors(row, position, pairs, rest):
     for c in range(rest.size):
         if rest[c] > 0.0:
             i, j = pairs[0, c], pairs[1, c]
-            dx, dy, dz = float(x[j]) - x[i], float(y[j]) - y[i], float(z[j]) - z[i]
+            dx, dy, dz = np.float64(x[j]) - x[i], np.float64(y[j]) - y[i], np.float64(z[j]) - z[i]
             error = abs(math.sqrt(dx * dx + dy * dy + dz * dz) / rest[c] - 1.0)
             worst, counted = max(worst, error), counted + 1
             squares += error * error

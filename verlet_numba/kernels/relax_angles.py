@@ -1,5 +1,7 @@
 """One relaxation pass over all angle constraints (paper, 4)."""
 
+import numpy as np
+
 from verlet_numba._jit import kernel
 from verlet_numba.physics.angle import bend
 
@@ -12,9 +14,9 @@ def relax_angles(position, inverse_mass, angles):
     x, y, z = position[0], position[1], position[2]
     for a in range(angles.rest.size):
         i, j, k = angles.corners[0, a], angles.corners[1, a], angles.corners[2, a]
-        jx, jy, jz = float(x[j]), float(y[j]), float(z[j])
+        jx, jy, jz = np.float64(x[j]), np.float64(y[j]), np.float64(z[j])
         moved = bend(x[i] - jx, y[i] - jy, z[i] - jz, x[k] - jx, y[k] - jy, z[k] - jz, angles.rest[a],
-                     float(inverse_mass[i]), float(inverse_mass[j]), float(inverse_mass[k]))
+                     np.float64(inverse_mass[i]), np.float64(inverse_mass[j]), np.float64(inverse_mass[k]))
         x[i] += moved[0]
         y[i] += moved[1]
         z[i] += moved[2]

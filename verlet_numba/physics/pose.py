@@ -1,4 +1,7 @@
-"""Poses of colliders: rotation about an axis, and into and out of a solid's own frame."""
+"""Poses: rotation about an axis, and into and out of a solid's own frame.
+
+A pose is twelve numbers: the origin and, row by row, the rotation whose columns are the solid's axes.
+"""
 
 import math
 
@@ -20,17 +23,17 @@ def turn(x, y, z, sx, sy, sz, time):
 
 
 @formula
-def inward(x, y, z, origin, rotation, k):
-    """Coordinates in the frame of solid k."""
-    x, y, z = x - origin[0, k], y - origin[1, k], z - origin[2, k]
-    return (rotation[0, 0, k] * x + rotation[1, 0, k] * y + rotation[2, 0, k] * z,
-            rotation[0, 1, k] * x + rotation[1, 1, k] * y + rotation[2, 1, k] * z,
-            rotation[0, 2, k] * x + rotation[1, 2, k] * y + rotation[2, 2, k] * z)
+def inward(x, y, z, pose):
+    """Coordinates of a point [m] in the frame of a pose."""
+    x, y, z = x - pose[0], y - pose[1], z - pose[2]
+    return (pose[3] * x + pose[6] * y + pose[9] * z,
+            pose[4] * x + pose[7] * y + pose[10] * z,
+            pose[5] * x + pose[8] * y + pose[11] * z)
 
 
 @formula
-def outward(x, y, z, rotation, k):
-    """A direction in the frame of solid k, in world axes."""
-    return (rotation[0, 0, k] * x + rotation[0, 1, k] * y + rotation[0, 2, k] * z,
-            rotation[1, 0, k] * x + rotation[1, 1, k] * y + rotation[1, 2, k] * z,
-            rotation[2, 0, k] * x + rotation[2, 1, k] * y + rotation[2, 2, k] * z)
+def outward(x, y, z, pose):
+    """A direction in the frame of a pose, in world axes."""
+    return (pose[3] * x + pose[4] * y + pose[5] * z,
+            pose[6] * x + pose[7] * y + pose[8] * z,
+            pose[9] * x + pose[10] * y + pose[11] * z)

@@ -30,3 +30,11 @@ def inverse_symmetric(xx, yy, zz, xy, xz, yz):
 def times_symmetric(xx, yy, zz, xy, xz, yz, x, y, z):
     """Symmetric matrix times vector."""
     return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
+
+
+@formula
+def lever(rx, ry, rz, nx, ny, nz, inverse_mass, inverse_inertia):
+    """How a body answers at the arm r along the unit vector n: r x n, I^-1 (r x n), and the displacement of a unit impulse."""
+    tx, ty, tz = cross(rx, ry, rz, nx, ny, nz)
+    ix, iy, iz = times_symmetric(*inverse_inertia, tx, ty, tz)
+    return tx, ty, tz, ix, iy, iz, inverse_mass + tx * ix + ty * iy + tz * iz

@@ -9,6 +9,7 @@ from verlet_numba.buffers import COLUMNS, World
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.numbering import Group
 from verlet_numba.scene.prepare import Prepared
+from verlet_numba.scene.schema import Scene
 
 INTERPRETER = 160 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
 CHUNK_BYTES = 32 << 20      # of a chunk of frames on its way to the file, at most
@@ -38,7 +39,7 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
         "file_bytes_at_most": file_bytes(model)}
 
 
-def frame_count(scene: Any) -> int:
+def frame_count(scene: Scene) -> int:
     """Frames of the file, the start included."""
     return round(scene.time.duration * scene.time.frame_rate) + 1
 

@@ -19,13 +19,10 @@ def test_no_spin_turns_nothing():
     assert turn(1.0, 0.0, 0.0, 0.0, 0.0, np.pi, 0.5) == pytest.approx((0, 1, 0))
 
 
-def test_inward_and_outward_are_the_frame_of_the_solid():
+def test_inward_and_outward_are_the_frame_of_the_pose():
     rng = np.random.default_rng(1)
-    rotation = Rotation.random(3, rng=1).as_matrix()
-    origin = rng.normal(size=(3, 3))
-    stored, columns = np.ascontiguousarray(rotation.transpose(1, 2, 0)), np.ascontiguousarray(origin.T)
-    for k in range(3):
-        p = rng.normal(size=3)
-        local = inward(*p, columns, stored, k)
-        np.testing.assert_allclose(local, rotation[k].T @ (p - origin[k]), atol=1e-14)
-        np.testing.assert_allclose(np.array(outward(*local, stored, k)) + origin[k], p, atol=1e-14)
+    rotation, origin, p = Rotation.random(rng=1).as_matrix(), rng.normal(size=3), rng.normal(size=3)
+    pose = (*origin, *rotation.ravel())
+    local = inward(*p, pose)
+    np.testing.assert_allclose(local, rotation.T @ (p - origin), atol=1e-14)
+    np.testing.assert_allclose(np.array(outward(*local, pose)) + origin, p, atol=1e-14)
