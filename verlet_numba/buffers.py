@@ -235,7 +235,7 @@ class Frames(NamedTuple):
 
     position: Array             # (F, N, 3) file m
     velocity: Array | None      # (F, N, 3) file m/s
-    measures: Array             # (F, M) double; columns as numbered above
+    measures: Array             # (F, M) double SI; columns as numbered above
 
 
 def gate(values: Any, dtype: Any) -> Array:

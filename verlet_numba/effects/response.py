@@ -16,7 +16,8 @@ from verlet_numba.physics.friction import held
 from verlet_numba.physics.pose import turn
 from verlet_numba.physics.rigid import cross, inverse_symmetric, lever
 
-SWEEPS = 8
+SWEEPS = 8              # of projected Gauss-Seidel, at most
+SETTLED = 1e-7          # of the largest impulse: a sweep that changes less is the last
 NOTHING = -1e300        # a wish that no impulse is needed for
 
 
@@ -82,7 +83,7 @@ def twist(position, inverse_mass, contact, rigid, b, wanted, given):
     w, inertia, head = rigid.inverse_mass[b], inertia_of(rigid.inverse_inertia, b), rigid.head[b]
     px = py = pz = ox = oy = oz = 0.0
     for _ in range(SWEEPS):
-        c = head
+        c, change, largest = head, 0.0, 0.0
         while c >= 0:
             k, nx, ny, nz = particle[c], normal[0, c], normal[1, c], normal[2, c]
             tx, ty, tz, ix, iy, iz, answer = lever(x[k] - cx, y[k] - cy, z[k] - cz, nx, ny, nz, w, inertia)
@@ -92,7 +93,10 @@ def twist(position, inverse_mass, contact, rigid, b, wanted, given):
             impulse, given[c] = total - before, total * inverse_mass[k]
             px, py, pz = px + impulse * w * nx, py + impulse * w * ny, pz + impulse * w * nz
             ox, oy, oz = ox + impulse * ix, oy + impulse * iy, oz + impulse * iz
+            change, largest = max(change, abs(impulse)), max(largest, total)
             c = after[c]
+        if change <= SETTLED * largest:
+            break
     return px, py, pz, ox, oy, oz
 
 
@@ -103,9 +107,14 @@ def displace(position, rigid, b, moved):
     px, py, pz, ox, oy, oz = moved
     cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
     first, stride = rigid.first[b], rigid.stride[b]
+    ax, ay, az = turn(1.0, 0.0, 0.0, ox, oy, oz, 1.0)
+    bx, by, bz = turn(0.0, 1.0, 0.0, ox, oy, oz, 1.0)
+    ex, ey, ez = turn(0.0, 0.0, 1.0, ox, oy, oz, 1.0)
     for k in range(first, first + rigid.size[b] * stride, stride):
-        rx, ry, rz = turn(x[k] - cx, y[k] - cy, z[k] - cz, ox, oy, oz, 1.0)
-        x[k], y[k], z[k] = cx + px + rx, cy + py + ry, cz + pz + rz
+        rx, ry, rz = x[k] - cx, y[k] - cy, z[k] - cz
+        x[k] = cx + px + (ax * rx + bx * ry + ex * rz)
+        y[k] = cy + py + (ay * rx + by * ry + ey * rz)
+        z[k] = cz + pz + (az * rx + bz * ry + ez * rz)
     rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b] = cx + px, cy + py, cz + pz
 
 
@@ -136,12 +145,15 @@ def rebound(position, previous, inverse_mass, contact, restitution, rigid):
     leaves, wanted, given = restitution.rebound, rigid.wanted, rigid.given
     for t in range(rigid.touched[0]):
         b = rigid.order[t]
-        c = rigid.head[b]
+        c, hits = rigid.head[b], 0
         while c >= 0:
             k, given[c], wanted[c] = particle[c], 0.0, NOTHING
             if leaves[c] > 0.0 and push[c] > 0.0:
                 wanted[c] = leaves[c] - approach(normal, anchor, c, x[k], y[k], z[k])
+                hits += 1
             c = after[c]
+        if hits == 0:
+            continue
         kick_back(position, previous, rigid, b, twist(position, inverse_mass, contact, rigid, b, wanted, given))
         c = rigid.head[b]
         while c >= 0:
@@ -181,7 +193,7 @@ def hold(position, inverse_mass, contact, friction, rigid, b):
     w, inertia, head = rigid.inverse_mass[b], inertia_of(rigid.inverse_inertia, b), rigid.head[b]
     px = py = pz = ox = oy = oz = 0.0
     for sweep in range(SWEEPS):
-        c = head
+        c, change, largest = head, 0.0, 0.0
         while c >= 0:
             if sweep == 0:
                 grip[0, c] = grip[1, c] = grip[2, c] = 0.0
@@ -197,8 +209,11 @@ def hold(position, inverse_mass, contact, friction, rigid, b):
                 share = held(length * inverse_mass[k], push[c], static, dynamic) if length > 0.0 else 1.0
                 jx, jy, jz = gx * share - grip[0, c], gy * share - grip[1, c], gz * share - grip[2, c]
                 grip[0, c], grip[1, c], grip[2, c] = gx * share, gy * share, gz * share
+                change, largest = max(change, abs(jx), abs(jy), abs(jz)), max(largest, length * share)
                 px, py, pz = px + jx * w, py + jy * w, pz + jz * w
                 _, _, _, ix, iy, iz, _ = lever(rx, ry, rz, jx, jy, jz, w, inertia)
                 ox, oy, oz = ox + ix, oy + iy, oz + iz
             c = after[c]
+        if change <= SETTLED * largest:
+            break
     return px, py, pz, ox, oy, oz
