@@ -4,6 +4,7 @@ import json as json_module
 import re
 import shlex
 import sys
+import traceback
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -62,7 +63,8 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
 
     if verbose:
         say(f"{scene}: {len(prepared.bodies)} bodies, writing {output}")
-    summary = simulate(prepared, output, count=count, command=shlex.join(sys.argv), overwrite=overwrite, threads=threads,
+    command = shlex.join(["verlet-numba", *sys.argv[1:]])
+    summary = simulate(prepared, output, count=count, command=command, overwrite=overwrite, threads=threads,
                        quiet=quiet)
     if as_json:
         print_json(summary.as_dict())
@@ -176,6 +178,8 @@ def refuse_existing(output: Path, overwrite: bool) -> None:
     """Before any work: nothing that exists is overwritten unasked, and the folder must be there."""
     if output.exists() and not overwrite:
         raise click.ClickException(f"{output} exists already; give another with -o, or --overwrite")
+    if output.is_dir():
+        raise click.ClickException(f"{output} is a folder; name a file with -o")
     if not output.parent.is_dir():
         raise click.ClickException(f"{output.parent} is no folder; make it first, or give another with -o")
 
@@ -225,9 +229,9 @@ def describe_plan(found: dict[str, Any]) -> Iterable[str]:
 
 
 def fail(error: BaseException, code: int, text: str) -> NoReturn:
-    """End with one message; with --debug, with the traceback."""
+    """End with one message; with --debug, after the traceback."""
     if "--debug" in sys.argv:
-        raise error
+        traceback.print_exception(error)
     say(text)
     sys.exit(code)
 
@@ -254,6 +258,7 @@ def main() -> None:
 
 
 def one_line(error: Exception) -> str:
-    """An error without its traceback, in one line."""
+    """An error without its traceback, in one line. Those of the program and of the system need no name of their class."""
     words = " ".join(str(error).split())
-    return words if isinstance(error, OSError | ValueError) and words else f"{type(error).__name__}: {words}"
+    plain = isinstance(error, OSError | ValueError) or type(error).__module__.startswith("verlet_numba.")
+    return words if plain and words else f"{type(error).__name__}: {words}"

@@ -77,6 +77,7 @@ class Contents:
 
 def chunk_shape(particles: int, dtype: str, planned_frames: int) -> tuple[int, int, int]:
     """About 64 KiB of whole frames; one frame from 5,000 particles on; equal pieces of a frame above 4 MiB."""
+    particles = max(1, particles)       # a scene without bodies has chunks too
     frame = particles * 3 * np.dtype(dtype).itemsize
     frames = max(1, min(CHUNK_FRAMES, planned_frames, CHUNK_BYTES // frame))
     return frames, -(-particles // -(-frame // PIECE_BYTES)), 3
@@ -126,7 +127,7 @@ def _create_trajectory(file: h5py.File, contents: Contents, planned_frames: int)
     for name in contents.fields:
         element = group.create_group(name)
         values[name] = element.create_dataset(
-            "value", (0, contents.particles, 3), contents.dtype, maxshape=(None, contents.particles, 3),
+            "value", (0, contents.particles, 3), contents.dtype, maxshape=(None, contents.particles or None, 3),
             chunks=chunk_shape(contents.particles, contents.dtype, planned_frames),
             compression="gzip", compression_opts=1, shuffle=True)
         values[name].attrs["units"] = UNITS[name]

@@ -1,9 +1,6 @@
 """One scene, from its start to a finished trajectory file."""
 
-import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +13,7 @@ from verlet_numba.run.contents import contents, now, observables
 from verlet_numba.run.engine import State, run_chunk, start
 from verlet_numba.run.postmortem import Divergence, examine
 from verlet_numba.run.progress import Progress
+from verlet_numba.run.signals import StopSignals
 from verlet_numba.run.trajectory import TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
 from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
@@ -57,26 +55,6 @@ class Summary:
             "divergence": self.divergence.as_dict() if self.divergence else None}
 
 
-@contextmanager
-def stop_signals() -> Iterator[list[int]]:
-    """A list that SIGINT and SIGTERM append their number to. The second one acts as if nobody listened."""
-    received: list[int] = []
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def note(number: int, frame: object) -> None:
-        received.append(number)
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-    for number in before:
-        signal.signal(number, note)
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def simulate(prepared: Prepared, output: Path, *, count: int | None = None, command: str = "", overwrite: bool = False,
              threads: int = 2, quiet: bool = False) -> Summary:
     """Simulate a scene and write its trajectory; `count`: frames after frame 0 instead of the scene's duration.
@@ -89,10 +67,10 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     total = frame_count(prepared.scene) if count is None else count + 1
     with TrajectoryFile(output, contents(prepared, model, command), total, overwrite, beside=threads > 1) as file:
         summary.seconds["build"] = time.perf_counter() - clock
-        with Progress(total, prepared.scene.solver.substeps, quiet) as progress, stop_signals() as stopped:
+        with Progress(total, prepared.scene.solver.substeps, quiet) as progress, StopSignals() as signals:
             compile_kernels(model, progress, summary)
-            advance_all(model, file, total, progress, summary, stopped)
-        summary.signal = stopped[0] if stopped else None
+            signals.at_once = False
+            advance_all(model, file, total, progress, summary, signals)
         clock = time.perf_counter()
         file.flush()
         summary.seconds["write"] += time.perf_counter() - clock
@@ -110,12 +88,13 @@ def compile_kernels(model: Model, progress: Progress, summary: Summary) -> None:
     summary.seconds["compile"] = time.perf_counter() - clock
 
 
-def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progress, summary: Summary, stopped: list[int]) -> None:
+def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progress, summary: Summary,
+                signals: StopSignals) -> None:
     """Chunk after chunk, each handed to the file while the next is simulated, until the end, a divergence or a signal."""
     summary.seconds.update(simulate=0.0, write=0.0)
     most = max(1, CHUNK_BYTES // frame_bytes(model))
     size, chunk = 1, frames(model, 1)
-    while summary.frames < total and summary.divergence is None and not stopped:
+    while summary.frames < total and summary.divergence is None and not signals.received:
         size = min(size, most, total - summary.frames)
         if size != len(chunk.measures):
             chunk = frames(model, size)
@@ -133,8 +112,8 @@ def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progre
             summary.status = BROKEN
             summary.divergence = examine(model, before, (sound + 2) * model.world.solver.substeps)
         size = next_size(size, took, file.chunk_frames)
-    if stopped and summary.status == COMPLETE and summary.frames < total:
-        summary.status = STOPPED
+    if signals.received and summary.status == COMPLETE and summary.frames < total:
+        summary.status, summary.signal = STOPPED, signals.received
 
 
 def next_size(size: int, took: float, unit: int) -> int:

@@ -169,7 +169,8 @@ def not_simulated(bodies: list[Body]) -> Warnings:
 
 def resolution(scene: Scene, bodies: list[Body]) -> Warnings:
     """Coordinates so large that float32, in the solver or in the file, cannot tell neighbouring particles apart."""
-    lengths = [float(body.shape.lengths.min()) for body in bodies if len(body.shape.lengths)]
+    positive = [body.shape.lengths[body.shape.lengths > 0] for body in bodies]
+    lengths = [float(some.min()) for some in positive if len(some)]
     spacing = _float32_spacing(bodies)
     if not lengths or spacing <= RESOLVED * min(lengths):
         return

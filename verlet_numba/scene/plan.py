@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.buffers import COLUMNS, World
+from verlet_numba.scene.body import Shape
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.numbering import Group
 from verlet_numba.scene.prepare import Prepared
@@ -13,7 +14,10 @@ from verlet_numba.scene.schema import Scene
 
 INTERPRETER = 160 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
 CHUNK_BYTES = 32 << 20      # of a chunk of frames on its way to the file, at most
-FRAME_MEASURES = COLUMNS * 8 + 5 * 8
+FRAME_MEASURES = COLUMNS * 8 + 10 * 8       # bytes of a frame's observables, time and step, and offsets for VTK
+FILE_GROUPS = 128 << 10     # bytes of a file's groups, attributes and empty datasets
+FILE_CHUNK, FILE_ROWS = 64 << 10, 512       # the file grows by chunks: bytes of a field (or a frame); rows of measures
+FILE_INDEX = 1.01           # what finding the chunks takes
 
 
 class Phase(NamedTuple):
@@ -36,7 +40,7 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
                     "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
         "memory_bytes": INTERPRETER + total + 3 * chunk_bytes(model),
-        "file_bytes_at_most": file_bytes(model)}
+        "file_bytes_at_most": file_bytes(prepared, model)}
 
 
 def frame_count(scene: Scene) -> int:
@@ -134,7 +138,18 @@ def chunk_bytes(model: Model) -> int:
     return min(max(frame_bytes(model), CHUNK_BYTES), frame_bytes(model) * frame_count(model.scene))
 
 
-def file_bytes(model: Model) -> int:
-    """Size of the file if nothing could be compressed."""
-    constraints, cells = len(model.world.observed.rest), sum(len(body.shape.triangles) * body.copies for body in model.bodies)
-    return frame_bytes(model) * frame_count(model.scene) + constraints * 24 + cells * 40 + model.particles * 12 + 65536
+def file_bytes(prepared: Prepared, model: Model) -> int:
+    """Size of the file if nothing could be compressed, the last chunk of everything included."""
+    scene, count, fields = prepared.scene, frame_count(prepared.scene), 1 + len(prepared.scene.output.fields)
+    field = frame_bytes(model) - FRAME_MEASURES
+    unfilled = FRAME_MEASURES * min(count, FILE_ROWS) + min(field * count, max(field, fields * FILE_CHUNK))
+    frames = frame_bytes(model) * count + unfilled
+    shapes = sum(body.copies * static_bytes(body.shape) for body in model.bodies)
+    texts = 3 * len(prepared.loaded.source.text.encode()) + 1024 * (len(scene.bodies) + len(scene.colliders))
+    return FILE_GROUPS + int(FILE_INDEX * frames) + shapes + texts
+
+
+def static_bytes(shape: Shape) -> int:
+    """Bytes in the file of one copy: its row of /bodies, constraints, triangles, lines and single points."""
+    lines = sum(8 * len(line) + 12 for line in shape.lines)
+    return 256 + 16 * len(shape.sticks) + 36 * len(shape.triangles) + lines + 20 * len(shape.positions)
