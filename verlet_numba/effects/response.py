@@ -16,7 +16,7 @@ from verlet_numba.physics.friction import held
 from verlet_numba.physics.pose import turn
 from verlet_numba.physics.rigid import cross, inverse_symmetric, lever
 
-SWEEPS = 8              # of projected Gauss-Seidel, at most
+SWEEPS = 16             # of projected Gauss-Seidel, at most
 SETTLED = 1e-7          # of the largest impulse: a sweep that changes less is the last
 NOTHING = -1e300        # a wish that no impulse is needed for
 

@@ -15,8 +15,8 @@ def kept(request):
     rng, real = np.random.default_rng(0), request.param
     after, place, before = rng.normal(size=(3, 3, 15)).astype(real)
     order = rng.permutation(15)[:10]
-    pairs = np.array([[order[0], order[1]], [order[2], order[7]], [order[3], order[4]]])
-    observed = b.Observed(order, rng.uniform(0.5, 2, 10), rng.normal(size=(3, 10)), np.ascontiguousarray(pairs.T), np.array([1.0, 0.5, 0.0]))
+    pairs, rest = order[[[0, 2, 3], [1, 7, 4]]], np.array([1.0, 0.5, 0.0])
+    observed = b.Observed(order, rng.uniform(0.5, 2, 10), rng.normal(size=(3, 10)), pairs, rest)
     return after, b.Snapshot(place, before, np.array([5, 3, 11])), observed
 
 

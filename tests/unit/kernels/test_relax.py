@@ -31,7 +31,8 @@ class Case:
         alpha, w = compliance / H**2, self.w[self.ends]
         total = np.where(masked | (w.sum(0) == 0), 1, w.sum(0) + alpha)
         weight = np.where(masked, 0, w / total).astype(real)
-        self.softness = Softness((np.where(masked | (w.sum(0) == 0), 0, alpha) / total).astype(real), np.zeros(count, real)) if soft else None
+        share = np.where(masked | (w.sum(0) == 0), 0, alpha) / total
+        self.softness = Softness(share.astype(real), np.zeros(count, real)) if soft else None
         self.runs = Runs(first, lanes, data, rest, weight, int((weight.sum(0) > 0).sum()))
         self.sticks = Sticks(self.ends, rest, weight)
         self.twins = [Stick(*self.ends[:, c], float(rest[c]), compliance[c]) for c in np.flatnonzero(~masked)]
@@ -70,7 +71,7 @@ def test_forgotten_tension_starts_anew():
 
 def test_particles_in_one_place_stay_finite():
     """Attachments have rest length 0, and a stick's ends may meet."""
-    for rest, soft in ((0.0, False), (1.0, False)):
+    for rest in (0.0, 1.0):
         sticks = Sticks(np.array([[0], [1]]), np.array([rest]), np.array([[0.5], [0.5]]))
         x = np.ones((3, 2))
         relax_sticks(x, sticks, None, None, None)

@@ -21,8 +21,9 @@ def test_no_spin_turns_nothing():
 
 def test_inward_and_outward_are_the_frame_of_the_pose():
     rng = np.random.default_rng(1)
-    rotation, origin, p = Rotation.random(rng=1).as_matrix(), rng.normal(size=3), rng.normal(size=3)
-    pose = (*origin, *rotation.ravel())
-    local = inward(*p, pose)
-    np.testing.assert_allclose(local, rotation.T @ (p - origin), atol=1e-14)
-    np.testing.assert_allclose(np.array(outward(*local, pose)) + origin, p, atol=1e-14)
+    for rotation in Rotation.random(5, rng=1).as_matrix():
+        origin, p = rng.normal(size=(2, 3))
+        pose = (*origin, *rotation.ravel())
+        local = inward(*p, pose)
+        np.testing.assert_allclose(local, rotation.T @ (p - origin), atol=1e-14)
+        np.testing.assert_allclose(np.array(outward(*local, pose)) + origin, p, atol=1e-14)

@@ -1,0 +1,88 @@
+"""Cost of one distance projection: the simulator's runs against a naive loop over sticks.
+
+A projection is one real stick once; lanes that are masked out do not count. Every repetition starts from the same
+positions, about 3 % of a stick's length off.
+"""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import naive
+import numpy as np
+from cases import cloth, icosahedra, prepared, scene_of
+from numba import njit
+from numpy.typing import NDArray
+from report import Figure, figure
+from timing import computed, interleaved
+
+from verlet_numba.kernels.relax import relax_runs
+from verlet_numba.run.engine import start
+from verlet_numba.scene.build import Model, build
+
+STUDY = "projections"
+CASES = {"icosahedra, 1,000 copies": icosahedra(1_000), "icosahedra, 10,000 copies": icosahedra(10_000),
+         "cloth 20x20": cloth(20), "cloth 40x40": cloth(40), "cloth 100x100": cloth(100), "cloth 20x20, 32 copies": cloth(20, 32)}
+BARS = {("icosahedra, 1,000 copies", "float32"): 1.6, ("icosahedra, 1,000 copies", "float64"): 3.2,
+        ("cloth 40x40", "float32"): 3.0, ("cloth 40x40", "float64"): 4.2}                           # ns
+GAINS = {("icosahedra, 1,000 copies", "float32"): 8.0}                                              # naive / runs
+PROJECTIONS = {True: 400_000, False: 3_000_000}         # a repetition, by `quick`
+REPETITIONS = {True: 7, False: 21}
+JITTER = 0.03
+
+
+@njit
+def relax(position, runs, passes):
+    """`passes` over all runs in one call, so that the call itself does not count."""
+    for _ in range(passes):
+        relax_runs(position, runs, None, None, None)
+
+
+def measure(quick: bool) -> Iterator[Figure]:
+    for case, body in CASES.items():
+        for precision in ("float32", "float64"):
+            yield from compare(case, body, precision, quick)
+
+
+def compare(case: str, body: dict[str, Any], precision: str, quick: bool) -> Iterator[Figure]:
+    """Nanoseconds a projection of both, and their ratio."""
+    scene = prepared(scene_of(body, effects={}, solver={"precision": precision}))
+    model = start(build(scene.scene, scene.bodies))
+    runs = model.world.runs
+    passes = -(-PROJECTIONS[quick] // runs.active)
+    flat = body_major(model)
+    position, own = jittered(model.world.particles.position, flat, model)
+    jobs = [partial(repetition, relax, position, (runs, passes)), partial(repetition, naive.relax, own, (*flat[1:], passes))]
+    fast, slow = interleaved(REPETITIONS[quick], *jobs) * 1e9 / (passes * runs.active)
+    at = (case, precision)
+    yield figure(STUDY, case, f"runs, {precision}", "ns", fast, at_most=BARS.get(at))
+    yield figure(STUDY, case, f"naive, {precision}", "ns", slow)
+    yield figure(STUDY, case, f"naive / runs, {precision}", "x", slow / fast, at_least=GAINS.get(at))
+
+
+def repetition(relaxation: Any, start: NDArray[Any], arguments: tuple[Any, ...]) -> float:
+    position = start.copy()
+    return computed(lambda: relaxation(position, *arguments))
+
+
+def body_major(model: Model) -> tuple[NDArray[Any], ...]:
+    """Positions (n, 3), sticks (C, 2), rest lengths (C,) and inverse masses (n,), body after body and copy after copy."""
+    real = model.world.particles.position.dtype
+    positions, sticks, rest, masses, first = [], [], [], [], 0
+    for body in model.bodies:
+        for copy in body.positions:
+            positions.append(copy)
+            sticks.append(body.shape.sticks + first)
+            rest.append(body.shape.lengths)
+            masses.append(np.where(body.pinned, np.inf, body.shape.masses))
+            first += len(copy)
+    return (np.concatenate(positions).astype(real), np.concatenate(sticks), np.concatenate(rest).astype(real),
+            (1 / np.concatenate(masses)).astype(real))
+
+
+def jittered(position: NDArray[Any], flat: tuple[NDArray[Any], ...], model: Model) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The same displaced particles in the simulator's order (3, n) and body-major (n, 3)."""
+    own = flat[0] + np.random.default_rng(0).normal(0, JITTER * flat[2].mean(), flat[0].shape).astype(flat[0].dtype)
+    position = position.copy()
+    position[:, model.numbering.scene_order] = own.T
+    return position, own
