@@ -1,8 +1,13 @@
 """What one would write first: loops over particles and sticks, positions (n, 3), Numba's default flags."""
 
 import math
+from typing import Any
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+from verlet_numba.scene.build import Model
 
 
 @njit
@@ -36,3 +41,18 @@ def advance(position, previous, sticks, rest, inverse_mass, gravity, h, substeps
                     position[i, axis] = 2 * now - previous[i, axis] + gravity[axis] * h * h
                     previous[i, axis] = now
         relax(position, sticks, rest, inverse_mass, 1)
+
+
+def body_major(model: Model) -> tuple[NDArray[Any], ...]:
+    """Positions (n, 3), sticks (C, 2), rest lengths (C,) and inverse masses (n,), body after body and copy after copy."""
+    real = model.world.particles.position.dtype
+    positions, sticks, rest, masses, first = [], [], [], [], 0
+    for body in model.bodies:
+        for copy in body.positions:
+            positions.append(copy)
+            sticks.append(body.shape.sticks + first)
+            rest.append(body.shape.lengths)
+            masses.append(np.where(body.pinned, np.inf, body.shape.masses))
+            first += len(copy)
+    return (np.concatenate(positions).astype(real), np.concatenate(sticks), np.concatenate(rest).astype(real),
+            (1 / np.concatenate(masses)).astype(real))

@@ -50,8 +50,9 @@ def compare(case: str, body: dict[str, Any], precision: str, quick: bool) -> Ite
     model = start(build(scene.scene, scene.bodies))
     runs = model.world.runs
     passes = -(-PROJECTIONS[quick] // runs.active)
-    flat = body_major(model)
+    flat = naive.body_major(model)
     position, own = jittered(model.world.particles.position, flat, model)
+    check(position, own, flat, model, (runs, passes))
     jobs = [partial(repetition, relax, position, (runs, passes)), partial(repetition, naive.relax, own, (*flat[1:], passes))]
     fast, slow = interleaved(REPETITIONS[quick], *jobs) * 1e9 / (passes * runs.active)
     at = (case, precision)
@@ -65,24 +66,23 @@ def repetition(relaxation: Any, start: NDArray[Any], arguments: tuple[Any, ...])
     return computed(lambda: relaxation(position, *arguments))
 
 
-def body_major(model: Model) -> tuple[NDArray[Any], ...]:
-    """Positions (n, 3), sticks (C, 2), rest lengths (C,) and inverse masses (n,), body after body and copy after copy."""
-    real = model.world.particles.position.dtype
-    positions, sticks, rest, masses, first = [], [], [], [], 0
-    for body in model.bodies:
-        for copy in body.positions:
-            positions.append(copy)
-            sticks.append(body.shape.sticks + first)
-            rest.append(body.shape.lengths)
-            masses.append(np.where(body.pinned, np.inf, body.shape.masses))
-            first += len(copy)
-    return (np.concatenate(positions).astype(real), np.concatenate(sticks), np.concatenate(rest).astype(real),
-            (1 / np.concatenate(masses)).astype(real))
-
-
 def jittered(position: NDArray[Any], flat: tuple[NDArray[Any], ...], model: Model) -> tuple[NDArray[Any], NDArray[Any]]:
     """The same displaced particles in the simulator's order (3, n) and body-major (n, 3)."""
     own = flat[0] + np.random.default_rng(0).normal(0, JITTER * flat[2].mean(), flat[0].shape).astype(flat[0].dtype)
     position = position.copy()
     position[:, model.numbering.scene_order] = own.T
     return position, own
+
+
+def check(position: NDArray[Any], own: NDArray[Any], flat: tuple[NDArray[Any], ...], model: Model, work: tuple[Any, int]) -> None:
+    """Both really relax the same sticks. Raises RuntimeError if they do not bring them nearer to their rest lengths."""
+    _, sticks, rest, inverse_mass = flat
+    before, by_runs, by_loop = own.copy(), position.copy(), own.copy()
+    relax(by_runs, *work)
+    naive.relax(by_loop, sticks, rest, inverse_mass, work[1])
+    errors = []
+    for x in (before, by_runs[:, model.numbering.scene_order].T, by_loop):
+        length = np.linalg.norm(x[sticks[:, 1]] - x[sticks[:, 0]], axis=1)
+        errors.append(float(np.sqrt(np.mean((length / rest - 1) ** 2))))
+    if len(rest) != work[0].active or not max(errors[1:]) < 0.9 * errors[0]:
+        raise RuntimeError(f"{work[0].active} of {len(rest)} sticks relaxed, from an error of {errors[0]:.2g} to {errors[1:]}")

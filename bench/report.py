@@ -4,7 +4,7 @@ import csv
 import os
 import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
@@ -70,13 +70,13 @@ def machine() -> str:
             f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")
 
 
-def table(figures: Iterable[Figure]) -> str:
-    """One line a figure."""
-    lines = [f"{'study':<12}{'case':<34}{'quantity':<30}{'median':>9}{'low':>9}{'high':>9}  {'unit':<5}{'bar':<9}verdict"]
-    for f in figures:
-        values = "".join(f"{value:>9.4g}" for value in (f.median, f.low, f.high))
-        lines.append(f"{f.study:<12}{f.case:<34}{f.quantity:<30}{values}  {f.unit:<5}{f.bar:<9}{f.verdict}")
-    return "\n".join(lines)
+HEADER = f"{'study':<12}{'case':<34}{'quantity':<30}{'median':>9}{'low':>9}{'high':>9}  {'unit':<5}{'bar':<9}verdict"
+
+
+def line(f: Figure) -> str:
+    """A figure as a line under HEADER."""
+    values = "".join(f"{value:>9.4g}" for value in (f.median, f.low, f.high))
+    return f"{f.study:<12}{f.case:<34}{f.quantity:<30}{values}  {f.unit:<5}{f.bar:<9}{f.verdict}"
 
 
 def write_csv(figures: Sequence[Figure], where: str, path: Path) -> None:
@@ -118,7 +118,7 @@ def draw_projections(axes: Any, figures: Sequence[Figure]) -> None:
     axes.set_yticks(np.arange(len(cases)) + 0.4, cases)
     axes.invert_yaxis()
     axes.set_xlabel("ns a distance projection (median, range)")
-    axes.legend()
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=5)
 
 
 def draw_bars(axes: Any, figures: Sequence[Figure]) -> None:

@@ -6,7 +6,6 @@ from functools import partial
 import naive
 import numpy as np
 from cases import ROPE, prepared, scene_of
-from projections import body_major
 from report import Figure, figure
 from timing import computed, interleaved
 
@@ -40,7 +39,7 @@ def frame_loop(substeps_a_frame: int, substeps: int) -> Callable[[], float]:
 def naive_loop(substeps: int) -> Callable[[], float]:
     scene = prepared(scene_of(ROPE, solver={"substeps": MANY}))
     model = build(scene.scene, scene.bodies)
-    position, *sticks = body_major(model)
+    position, *sticks = naive.body_major(model)
     gravity, h = np.array([0, 0, -9.81]), model.world.solver.step
     work = partial(naive.advance, position, position.copy(), *sticks, gravity, h, substeps)
     return lambda: computed(work)

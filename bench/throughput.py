@@ -24,9 +24,12 @@ STUDIES = {module.STUDY: module.measure for module in (projections, rope, start_
 def main(quick: bool, only: tuple[str, ...], results: Path) -> None:
     """Measure throughput, start-up, writing and memory."""
     where = report.machine() + (", quick" if quick else "")
-    figures = [found for study in only or STUDIES for found in STUDIES[study](quick)]
-    click.echo(where)
-    click.echo(report.table(figures))
+    click.echo(f"{where}\n{report.HEADER}")
+    figures = []
+    for study in only or STUDIES:
+        for found in STUDIES[study](quick):
+            click.echo(report.line(found))
+            figures.append(found)
     results.mkdir(parents=True, exist_ok=True)
     report.write_csv(figures, where, results / "throughput.csv")
     report.draw(figures, where, results / "throughput.png")
