@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SWEEPS = 8          # of the contacts of a rigid body
+from verlet_numba.effects.response import SETTLED, SWEEPS  # how far the contacts of a rigid body are iterated
 
 
 def turned(axis, angle):
@@ -143,6 +143,12 @@ def held(slide, push, static, dynamic):
     return dynamic * push / slide
 
 
+def settled(before, after):
+    """Whether a sweep changed impulses, numbers or vectors, by next to nothing."""
+    change = np.abs(np.array(after) - np.array(before)).max(initial=0)
+    return change <= SETTLED * max((np.linalg.norm(impulse) for impulse in after), default=0)
+
+
 class Whole:
     """A rigid body that answers to its contacts as a whole.
 
@@ -172,13 +178,17 @@ class Whole:
     def twist(self, wanted, given):
         """Translation and rotation that make every contact rise by what is `wanted`, with pushes `given` never below 0."""
         shift, turn = np.zeros(3), np.zeros(3)
+        impulses = [push / self.twin.w[contact.k] for push, contact in zip(given, self.contacts, strict=True)]
         for _ in range(SWEEPS):
+            before = impulses.copy()
             for c, contact in enumerate(self.contacts):
-                n, w = contact.normal, self.twin.w[contact.k]
+                n = contact.normal
                 rise = n @ (shift + np.cross(turn, self.arm(contact)))
-                before = given[c]
-                given[c] = max(0.0, before + w * (wanted[c] - rise) / self.response(contact, n))
-                shift, turn = self.pushed(shift, turn, contact, (given[c] - before) / w * n)
+                impulses[c] = max(0.0, before[c] + (wanted[c] - rise) / self.response(contact, n))
+                shift, turn = self.pushed(shift, turn, contact, (impulses[c] - before[c]) * n)
+            if settled(before, impulses):
+                break
+        given[:] = [impulse * self.twin.w[contact.k] for impulse, contact in zip(impulses, self.contacts, strict=True)]
         return shift, turn
 
     def pushed(self, shift, turn, contact, impulse):
@@ -215,14 +225,16 @@ class Whole:
         shift, turn = np.zeros(3), np.zeros(3)
         impulses = [np.zeros(3) for _ in self.contacts]
         for _ in range(SWEEPS):
+            before = impulses.copy()
             for c, contact in enumerate(self.contacts):
                 slide = contact.slide(self.twin.x[contact.k] + shift + np.cross(turn, self.arm(contact)))
                 length = np.linalg.norm(slide)
                 if contact.push <= 0 or length == 0:
                     continue
-                before = impulses[c]
-                wished = before - slide / self.response(contact, slide / length)
+                wished = impulses[c] - slide / self.response(contact, slide / length)
                 size = np.linalg.norm(wished) * self.twin.w[contact.k]
                 impulses[c] = wished * held(size, contact.push, *self.twin.friction(contact))
-                shift, turn = self.pushed(shift, turn, contact, impulses[c] - before)
+                shift, turn = self.pushed(shift, turn, contact, impulses[c] - before[c])
+            if settled(before, impulses):
+                break
         self.move(shift, turn)

@@ -24,7 +24,7 @@ import numpy as np
 config: Any = numba.config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False}
+FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True}
 FOLDERS_KEPT = 4
 
 
@@ -70,12 +70,7 @@ def kernel(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function as part of its callers. For two uses:
-
-    - the stages of the frame loop: every set of effects makes them anew, and each function that is compiled on its own
-      costs about a second then, whatever it holds;
-    - what a kernel calls for every particle or contact with whole buffers as arguments: a call of its own would pass
-      each array by value and count its references, 500 ns where the work is 20.
+    """Compile a function as part of its callers: for what a loop calls for each particle or contact with arrays.
 
     It must not test an argument for None: that branch is pruned in functions of their own only.
     """

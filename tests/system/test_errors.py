@@ -35,7 +35,7 @@ effects:
 """
 PLACES = {"2:21": "frame_rate", "3:20": "substeps", "5:5": "mass", "6:12": "box", "7:56": "finite", "9:3": "gravity"}
 
-SAMPLES = {     # of everything that some version refuses: path -> (override, where the refused part of it begins)
+SAMPLES = {     # an override for everything that this version may not do yet
     "solver.preset": "solver.preset=paper", "solver.order": "solver.order=lines",
     "solver.gradient": "solver.gradient=step_start", "solver.repeats": "solver.repeats=once",
     "solver.response": "solver.response=feature", "solver.projection_point": "solver.projection_point=body",
@@ -133,7 +133,8 @@ def test_files_that_are_no_trajectory(verlet, mixed, tmp_path):
 
 
 def test_debug_shows_the_traceback_and_keeps_the_exit_code(verlet, tmp_path):
-    for arguments, code, error in ((["run", "missing"], 2, "SceneError"), (["render", "missing", "-o", "x.png"], 1, "TrajectoryError")):
+    for arguments, code, error in ((["run", "missing"], 2, "SceneError"),
+                                   (["render", "missing", "-o", "x.png"], 1, "TrajectoryError")):
         shown = verlet("--debug", *arguments, cwd=tmp_path, code=code).stderr
         assert "Traceback" in shown
         assert error in shown
@@ -163,7 +164,7 @@ def limited(size):
 
 
 def test_a_full_disk_keeps_what_was_written(verlet, write_scene, tmp_path):
-    scene = write_scene(**HOUR)
+    scene = write_scene(**{**HOUR, "time": {"duration": 2000, "frame_rate": 60}})       # 4 MB
     verlet("warm", scene)           # machine code is a file too
     done = verlet("run", scene, "-q", "-o", "x.vtkhdf", cwd=tmp_path, code=1, preexec_fn=limited(1_000_000))
     line = one_line(done)

@@ -51,10 +51,10 @@ def find_contacts(position, previous, inverse_mass, contact):
     if contact is None:
         return True
     contact.listed[0] = 0
+    fits = True
     for s in range(contact.solids.kind.size):
-        if not list_contacts(position, previous, inverse_mass, contact, s):
-            return False
-    return True
+        fits = fits and list_contacts(position, previous, inverse_mass, contact, s)
+    return fits
 
 
 @kernel

@@ -105,6 +105,8 @@ def displace(position, rigid, b, moved):
     """Move all particles of body b by a twist, turning it about its centre exactly."""
     x, y, z = position[0], position[1], position[2]
     px, py, pz, ox, oy, oz = moved
+    if px == py == pz == ox == oy == oz == 0.0:
+        return
     cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
     first, stride = rigid.first[b], rigid.stride[b]
     ax, ay, az = turn(1.0, 0.0, 0.0, ox, oy, oz, 1.0)

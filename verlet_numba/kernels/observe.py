@@ -23,11 +23,11 @@ FAR = 1e30
 
 
 @kernel
-def keep(particles, snapshot, contacts):
+def keep(position, previous, snapshot, contacts):
     """At a frame's time: keep the state that the next substep completes."""
     for axis in range(3):
         place, before = snapshot.position[axis], snapshot.before[axis]
-        now, earlier = particles.position[axis], particles.previous[axis]
+        now, earlier = position[axis], previous[axis]
         for k in range(now.size):
             place[k], before[k] = now[k], earlier[k]
     snapshot.counts[1], snapshot.counts[2], snapshot.counts[0] = contacts, snapshot.counts[0], 0

@@ -1,13 +1,16 @@
 """The frame loop as Python sees it: start a model, advance it by a chunk of frames, take its state back."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import FRAME, Array, Frames, World, gate
-from verlet_numba.frame import FULL, accelerate, advance, substep
-from verlet_numba.scene.build import Model
+from verlet_numba.buffers import FRAME, SUBSTEP, Array, Frames, World, gate
+from verlet_numba.effects.damping import damp
+from verlet_numba.effects.drag import resist
+from verlet_numba.effects.gravity import fall
+from verlet_numba.effects.wind import blow
+from verlet_numba.frame import FULL, advance
+from verlet_numba.scene.build import Model, frames
 from verlet_numba.scene.colliders import room
 
 
@@ -24,9 +27,19 @@ def start(model: Model) -> Model:
     particles.position[:] = position
     particles.previous[:] = position - velocity * h
     if particles.acceleration is not None:
-        accelerate(particles, model.world.effects, h)
+        accelerate(model.world)
         particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
     return model
+
+
+def accelerate(world: World) -> None:
+    """What accelerates the particles where they are, as the frame loop finds it."""
+    position, previous, _, acceleration = world.particles
+    effects, h = world.effects, world.solver.step
+    fall(acceleration, effects.gravity)
+    blow(position, previous, acceleration, h, effects.wind)
+    resist(position, previous, acceleration, h, effects.drag)
+    damp(position, previous, acceleration, h, effects.damping)
 
 
 def grown(world: World) -> World:
@@ -54,9 +67,12 @@ def run_chunk(model: Model, chunk: Frames) -> int:
 
 
 def run_substep(model: Model) -> None:
-    """One substep alone, bit for bit as within a chunk."""
-    while substep(model.world) == FULL:
-        model.world = grown(model.world)
+    """One substep alone, bit for bit as within a chunk: a chunk of one frame of one substep."""
+    solver, clock = model.world.solver, model.world.clock
+    clock[SUBSTEP] = 0
+    model.world = model.world._replace(solver=solver._replace(substeps=1))
+    run_chunk(model, frames(model, 1))
+    model.world = model.world._replace(solver=solver)
 
 
 @dataclass(frozen=True)
@@ -86,8 +102,3 @@ class State:
 def sound(world: World) -> bool:
     """Whether all positions are finite."""
     return bool(np.isfinite(world.particles.position).all())
-
-
-def compiled() -> Any:
-    """Signatures that the frame loop has machine code for in this process."""
-    return advance.signatures  # type: ignore[attr-defined]

@@ -111,15 +111,15 @@ def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progre
         if status == DIVERGED:
             summary.status = BROKEN
             summary.divergence = examine(model, before, (sound + 2) * model.world.solver.substeps)
-        size = next_size(size, took, file.chunk_frames)
+        size = next_size(size, took)
     if signals.received and summary.status == COMPLETE and summary.frames < total:
         summary.status, summary.signal = STOPPED, signals.received
 
 
-def next_size(size: int, took: float, unit: int) -> int:
-    """Frames of the next chunk: about CHUNK_SECONDS, at most eight times as many as before, whole chunks of the file."""
+def next_size(size: int, took: float) -> int:
+    """Frames of the next chunk: a power of two, so that it seldom changes, of about CHUNK_SECONDS; at most eight times as many."""
     wished = min(8.0 * size, size * CHUNK_SECONDS / max(took, 1e-6))
-    return max(1, int(wished) // unit * unit if wished >= unit else int(wished))
+    return 1 << max(0, int(wished).bit_length() - 1)
 
 
 def store(model: Model, file: TrajectoryFile, chunk: Frames, sound: int, summary: Summary) -> None:

@@ -25,6 +25,7 @@ from verlet_numba.run.ordered_file import OrderedFile
 __all__ = ["BodyTable", "Contents", "Quantity", "TrajectoryFile"]
 
 UNDER_WAY = 2       # blocks that may wait for the disk while the simulation goes on
+CACHE_BYTES = 65536 # of HDF5 for the chunks of each dataset: they are written once, and its 8 MiB each would grow with the run
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,8 @@ class TrajectoryFile:
         self._refuse_to_overwrite()
         self._disk = self._open_disk()
         try:
-            self._file = h5py.File(self._disk, "r+" if self._named else "w", libver=LIBVER, locking=False)
+            self._file = h5py.File(self._disk, "r+" if self._named else "w", libver=LIBVER, locking=False,
+                                   rdcc_nbytes=CACHE_BYTES)
             if resume_at is None:
                 create_layout(self._file, contents, planned_frames)
             self._attach()

@@ -56,11 +56,10 @@ def _create_cells(group: h5py.Group, cells: Sequence[Integers] | Integers) -> No
 def _create_steps(steps: h5py.Group, particles: int, planned_frames: int, point_data: list[str]) -> None:
     """Where each step begins is known beforehand; how many steps there are, NSteps, is what a commit changes."""
     steps.attrs["NSteps"] = np.int64(0)
-    zeros = np.zeros(planned_frames, np.int64)
     offsets = write_static(steps, "PointOffsets", np.arange(planned_frames, dtype=np.int64) * particles)
-    write_static(steps, "NumberOfParts", zeros + 1)
-    write_static(steps, "PartOffsets", zeros)
-    steps["ConnectivityIdOffsets"] = write_static(steps, "CellOffsets", np.zeros((planned_frames, 4), np.int64))
+    steps.create_dataset("NumberOfParts", (planned_frames,), np.int64, fillvalue=1)     # never written: takes no space
+    steps.create_dataset("PartOffsets", (planned_frames,), np.int64)
+    steps["ConnectivityIdOffsets"] = steps.create_dataset("CellOffsets", (planned_frames, 4), np.int64)
     steps["CellDataOffsets/body"] = steps["PartOffsets"]
     steps.create_group("PointDataOffsets")
     for name in point_data:

@@ -12,8 +12,9 @@ from verlet_numba.scene.numbering import Group
 from verlet_numba.scene.prepare import Prepared
 from verlet_numba.scene.schema import Scene
 
-INTERPRETER = 160 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
-CHUNK_BYTES = 32 << 20      # of a chunk of frames on its way to the file, at most
+INTERPRETER = 190 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
+BUILDING = 1.4              # times the buffers: the bodies, their numbering, and what the file says of them
+CHUNK_BYTES = 2 << 20       # of a chunk of frames on its way to the file, at most
 FRAME_MEASURES = COLUMNS * 8 + 10 * 8       # bytes of a frame's observables, time and step, and offsets for VTK
 FILE_GROUPS = 128 << 10     # bytes of a file's groups, attributes and empty datasets
 FILE_CHUNK, FILE_ROWS = 64 << 10, 512       # the file grows by chunks: bytes of a field (or a frame); rows of measures
@@ -39,7 +40,7 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
         "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot),
                     "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
-        "memory_bytes": INTERPRETER + total + 3 * chunk_bytes(model),
+        "memory_bytes": INTERPRETER + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
         "file_bytes_at_most": file_bytes(prepared, model)}
 
 

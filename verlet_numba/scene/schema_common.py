@@ -34,7 +34,8 @@ Fraction = Annotated[Number, Field(ge=0, le=1)]
 
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 Sides = tuple[Length, Length, Length]
-Waypoint = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+Instant = Annotated[Number, Field(ge=0, le=1e9)]
+Waypoint = tuple[Instant, Coordinate, Coordinate, Coordinate]
 
 Name = Annotated[str, Field(pattern=r"^[^.=/\s]*[^.=/\s\d][^.=/\s]*$", max_length=200)]
 """Names stand in paths such as `bodies.NAME.mass`, so they hold no dot, slash, = or space, and are no mere number."""

@@ -67,7 +67,7 @@ def test_frames_are_in_the_order_of_the_file(kept):
 def test_keep_copies_the_state_and_moves_the_counts_on(kept):
     after, snapshot, _ = kept
     previous = after + 1
-    keep(b.Particles(after, previous, np.ones(15, after.dtype), None), snapshot, 7)
+    keep(after, previous, snapshot, 7)
     np.testing.assert_array_equal(snapshot.position, after)
     np.testing.assert_array_equal(snapshot.before, previous)
     np.testing.assert_array_equal(snapshot.counts, [0, 7, 5])
