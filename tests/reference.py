@@ -79,6 +79,13 @@ def relax_angle(x, w, corners, rest):
 
 # --- Forces -----------------------------------------------------------------------------------------------------------
 
+def path_slope(path):
+    """Velocity with which a path begins, if it begins at time 0."""
+    if path is None or len(path) < 2 or path[0, 0] > 0:
+        return np.zeros(3)
+    return (path[1, 1:] - path[0, 1:]) / (path[1, 0] - path[0, 0])
+
+
 def wind_force(corners, velocities, wind, density):
     """Force [N] on a triangle: density/2 area |u.n| (u.n) n."""
     cross = np.cross(corners[1] - corners[0], corners[2] - corners[0])
@@ -139,6 +146,8 @@ class Twin:
         self.find_constraints(per_copy)
         self.whole = [Whole(self, self.first[id(body), copy] + np.arange(len(body.pinned))) for body, copy in per_copy
                       if body.shape.rigid and not body.pinned.any()]
+        slopes = joined(np.broadcast_to(path_slope(body.path), body.positions[copy].shape) for body, copy in per_copy)
+        self.given = np.where(self.free[:, None], velocity, slopes)
         self.previous = self.x - velocity * self.h
         self.previous = self.x - velocity * self.h + self.acceleration() * self.h**2 / 2
 
@@ -254,6 +263,8 @@ class Twin:
     def frames(self, count):
         """The first `count` frames: positions and velocities (F, N, 3) and a dictionary of measures (F, ...) ."""
         shown = [self.frame(after=self.scene.solver.substeps if f else 0) for f in range(count)]
+        x, _, counts = shown[0]
+        shown[0] = x, self.given, counts | self.measures(x, self.given, 0.0)
         positions, velocities, measures = zip(*shown, strict=True)
         return np.array(positions), np.array(velocities), {key: np.array([m[key] for m in measures]) for key in measures[0]}
 

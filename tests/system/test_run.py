@@ -146,7 +146,10 @@ def test_provenance_is_enough_to_repeat_the_run(found, mixed):
     assert {"verlet-numba", "numba", "numpy", "h5py"} <= json.loads(text["versions"]).keys()
     assert text["status"].rstrip(b"\0") == b"complete"
     assert found["provenance/seed"] == 3
-    assert all(seconds >= 0 for seconds in json.loads(found["provenance/timing"].item()).values())
+    timing = json.loads(found["provenance/timing"].item())
+    assert timing["phases"].keys() == {"build", "compile", "simulate", "write"}
+    assert sum(timing["chunks"]["frames"]) == len(found["particles/trajectory/time"])
+    assert sum(timing["chunks"]["simulate"]) == pytest.approx(timing["phases"]["simulate"])
     assert found["provenance/start"].item().decode() <= found["provenance/end"].item().decode()
 
 

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verlet_numba.buffers import FRAME, SUBSTEP, Array, Frames, World, gate
+from verlet_numba.buffers import FRAME, NUMBER, PENETRATION, SUBSTEP, Array, Frames, Snapshot, World, gate
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.wind import blow
 from verlet_numba.frame import FULL, advance
+from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
 from verlet_numba.scene.colliders import room
 
@@ -20,16 +21,37 @@ def start(model: Model) -> Model:
     x0 - v0 h alone would put an error of -g h t/2 into free fall.
     """
     particles, h = model.world.particles, model.world.solver.step
-    position, velocity = (np.zeros(particles.position.shape) for _ in range(2))
-    for body, index in zip(model.bodies, model.numbering.bodies, strict=True):
-        position[:, index] = np.moveaxis(body.positions, 2, 0)
-        velocity[:, index] = np.where(body.pinned, 0.0, np.moveaxis(body.velocities, 2, 0))
+    position, velocity = initial(model)
+    velocity *= particles.inverse_mass > 0
     particles.position[:] = position
     particles.previous[:] = position - velocity * h
     if particles.acceleration is not None:
         accelerate(model.world)
         particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
     return model
+
+
+def initial(model: Model) -> tuple[Array, Array]:
+    """Positions [m] and velocities [m/s] (3, n) of the scene at time 0; pinned particles move as their path begins."""
+    position, velocity = (np.zeros(model.world.particles.position.shape) for _ in range(2))
+    for body, index in zip(model.bodies, model.numbering.bodies, strict=True):
+        held = np.zeros(3)
+        if body.path is not None and len(body.path) > 1 and body.path[0, 0] == 0.0:
+            held = (body.path[1, 1:] - body.path[0, 1:]) / (body.path[1, 0] - body.path[0, 0])
+        position[:, index] = np.moveaxis(body.positions, 2, 0)
+        velocity[:, index] = np.moveaxis(np.where(body.pinned[:, None], held, body.velocities), 2, 0)
+    return position, velocity
+
+
+def restate(model: Model, chunk: Frames) -> None:
+    """Frame 0 is the scene's own start: its velocities are the given ones, not a difference that constraints have changed."""
+    world, h, row = model.world, model.world.solver.step, chunk.measures[0]
+    position, velocity = initial(model)
+    deepest = row[PENETRATION]
+    snapshot = Snapshot(position, position - h * velocity, gate(np.zeros(3), np.int64))
+    observe(row, position + h * velocity, snapshot, world.observed, h)
+    row[PENETRATION] = deepest
+    record_velocity(chunk.velocity, 0, position + h * velocity, snapshot.before, world.observed.scene_order, h)
 
 
 def accelerate(world: World) -> None:
@@ -60,9 +82,12 @@ def grown(world: World) -> World:
 
 def run_chunk(model: Model, chunk: Frames) -> int:
     """The next len(chunk.measures) frames. Returns OK, or DIVERGED with the clock's FRAME at the first that is not sound."""
+    first = model.world.clock[NUMBER] == 0 and len(chunk.measures) > 0
     model.world.clock[FRAME] = 0
     while (status := advance(model.world, chunk)) == FULL:
         model.world = grown(model.world)
+    if first:
+        restate(model, chunk)
     return int(status)
 
 

@@ -37,6 +37,7 @@ class Summary:
     constraint_error_max: float = 0.0
     penetration_max: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)      # wall time by phase
+    chunks: list[tuple[int, float, float]] = field(default_factory=list)    # frames, seconds simulated, seconds handed over
     divergence: Divergence | None = None
     signal: int | None = None
 
@@ -47,6 +48,11 @@ class Summary:
     @property
     def real_time_factor(self) -> float:
         return self.simulated_seconds / self.seconds["simulate"] if self.seconds.get("simulate") else 0.0
+
+    def timing(self) -> dict[str, Any]:
+        """Wall seconds by phase and by chunk."""
+        frames, simulate, write = zip(*self.chunks, strict=True) if self.chunks else ((), (), ())
+        return {"phases": self.seconds, "chunks": {"frames": frames, "simulate": simulate, "write": write}}
 
     def as_dict(self) -> dict[str, Any]:
         keys = ("output", "status", "frames", "substeps", "simulated_seconds", "relaxations", "contacts",
@@ -74,7 +80,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
         clock = time.perf_counter()
         file.flush()
         summary.seconds["write"] += time.perf_counter() - clock
-        file.finish(summary.status, now(), summary.seconds)
+        file.finish(summary.status, now(), summary.timing())
     return summary
 
 
@@ -103,10 +109,12 @@ def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progre
         status = run_chunk(model, chunk)
         took = time.perf_counter() - clock
         sound = int(model.world.clock[FRAME]) if status == DIVERGED else size
-        summary.seconds["simulate"] += took
         clock = time.perf_counter()
         store(model, file, chunk, sound, summary)
-        summary.seconds["write"] += time.perf_counter() - clock
+        wrote = time.perf_counter() - clock
+        summary.seconds["simulate"] += took
+        summary.seconds["write"] += wrote
+        summary.chunks.append((sound, took, wrote))
         progress.update(summary.frames)
         if status == DIVERGED:
             summary.status = BROKEN

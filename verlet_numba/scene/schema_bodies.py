@@ -48,7 +48,7 @@ PinnedCloth = Annotated[
 PinnedRope = Annotated[Annotated[Numbers, Tag("<numbers>")] | Annotated[Literal["ends"], Tag("<word>")], _PINNED]
 
 Stick = Annotated[
-    Annotated[tuple[Whole, Whole], Tag("<2>")] | Annotated[tuple[Whole, Whole, Length], Tag("<3>")],
+    Annotated[tuple[Whole, Whole], Tag("<2>")] | Annotated[tuple[Whole, Whole, Thickness], Tag("<3>")],
     Discriminator(_row_of(2, 3), "row", "a stick is [i, j] or [i, j, length]: two particle numbers, and a length in m")]
 Degrees = Annotated[Number, Field(ge=0, le=180)]
 Angle = Annotated[

@@ -25,7 +25,6 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Coordinate = Annotated[Number, Field(ge=-1e9, le=1e9)]
 Length = Annotated[Number, Field(gt=0, le=1e9)]
 Thickness = Annotated[Number, Field(ge=0, le=1e9)]
-Mass = Annotated[Number, Field(gt=0, le=1e30)]
 Speed = Annotated[Number, Field(ge=0, le=1e9)]
 Integer = Annotated[int, Field(strict=True, le=2**62), BeforeValidator(_whole)]
 Whole = Annotated[Integer, Field(ge=0)]
@@ -54,6 +53,13 @@ def _rising(path: tuple[Waypoint, ...]) -> tuple[Waypoint, ...]:
     return path
 
 
+def _invertible(mass: float) -> float:
+    if mass < 1e-30:
+        raise PydanticCustomError("mass", "is too small to be a mass: it must be at least 1e-30")
+    return mass
+
+
+Mass = Annotated[Number, Field(gt=0, le=1e30), AfterValidator(_invertible)]
 Direction = Annotated[Vector, AfterValidator(_directed)]
 Trajectory = Annotated[tuple[Waypoint, ...], Field(min_length=1), AfterValidator(_rising)]
 

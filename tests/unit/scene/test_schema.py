@@ -132,7 +132,7 @@ POINTS = "kind: particles, positions: [[0, 0, 0], [1, 0, 0], [2, 0, 0]], masses:
     (POINTS.replace("masses: [1, 1, 1]", "masses: [1, 1]"), "bodies.0.masses", "for 3 positions"),
     (POINTS + ", sticks: [[0, 3]]", "bodies.0.sticks.0.1", "no particle 3"),
     (POINTS + ", sticks: [[0, 1], [2, 2]]", "bodies.0.sticks.1", "same particle"),
-    (POINTS + ", sticks: [[0, 1, 0]]", "bodies.0.sticks.0.2", "above 0"),
+    (POINTS + ", sticks: [[0, 1, -1]]", "bodies.0.sticks.0.2", "at least 0"),
     (POINTS + ", sticks: [[0]]", "bodies.0.sticks.0", "[i, j, length]"),
     (POINTS + ", sticks: [5]", "bodies.0.sticks.0", "[i, j, length]"),
     (POINTS + ", angles: [[0, 1, 0]]", "bodies.0.angles.0", "same particle"),
