@@ -24,6 +24,18 @@ IN_FULL = {"output.precision": "float64", "output.fields": ["velocity"],
            "expect": []}        # tests have bounds of their own, and may shorten a run
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--validate", action="store_true", help="also run what takes minutes (marked `validate`)")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption("--validate"):
+        long = pytest.mark.skip(reason="takes minutes: pytest --validate")
+        for item in items:
+            if "validate" in item.keywords:
+                item.add_marker(long)
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A run: T frames of N particles in the order of the scene, in double precision."""

@@ -86,12 +86,13 @@ def path_slope(path):
     return (path[1, 1:] - path[0, 1:]) / (path[1, 0] - path[0, 0])
 
 
-def wind_force(corners, velocities, wind, density):
-    """Force [N] on a triangle: density/2 area |u.n| (u.n) n."""
+def wind_force(corners, velocities, wind, density, inverse_masses=(0.0,), h=0.0):
+    """Force [N] on a triangle: density/2 area |u.n| (u.n) n, over 1 + k h/2 where six of them slow the lightest corner by k."""
     cross = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     area, normal = np.linalg.norm(cross) / 2, cross / np.linalg.norm(cross)
     along = (wind - np.mean(velocities, axis=0)) @ normal
-    return density / 2 * area * abs(along) * along * normal
+    k = 6 * density / 2 * area * abs(along) / 3 * max(inverse_masses)
+    return density / 2 * area * abs(along) * along * normal / (1 + k * h / 2)
 
 
 def with_drag(a, displacement, air, linear, quadratic, h):
@@ -157,8 +158,7 @@ class Twin:
             first, shape = self.first[id(body), copy], body.shape
             self.sticks += [Stick(*(first + shape.sticks[c]), shape.lengths[c], shape.compliance) for c in relaxation_order(shape)]
             self.angles += [(first + corners, rest) for corners, rest in zip(shape.angles, shape.angle_values, strict=True)]
-            if shape.kind == "cloth":
-                self.triangles += list(first + shape.triangles)
+            self.triangles += list(first + shape.triangles)
         self.observed = list(self.sticks)
         start = {body.name: self.first[id(body), 0] for body in self.bodies}
         self.sticks += [Stick(start[a] + i, start[b] + j, 0.0, 0.0) for a, i, b, j in self.scene.attachments]
@@ -175,7 +175,7 @@ class Twin:
         if effects.wind:
             air = np.array(effects.wind.velocity)
             for triangle in self.triangles:
-                force = wind_force(self.x[triangle], displacement[triangle] / h, air, effects.wind.density)
+                force = wind_force(self.x[triangle], displacement[triangle] / h, air, effects.wind.density, self.w[triangle], h)
                 for p in triangle:
                     a[p] += force / 3 * self.w[p]
         for p in np.flatnonzero(self.free):
@@ -246,7 +246,7 @@ class Twin:
         for contact in self.alone():
             if contact.rebound > 0 and contact.push > 0:
                 excess = contact.approach(self.x) - contact.rebound
-                contact.push -= excess
+                contact.push += max(0.0, -excess)
                 self.previous[contact.k] += excess * contact.normal
 
     def rub(self):

@@ -12,6 +12,7 @@ NumPy and the processor. An edit anywhere gives a new folder.
 import hashlib
 import os
 import platform
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True}
 FOLDERS_KEPT = 4
+OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 
 
 def fingerprint(package: Path = Path(__file__).parent) -> str:
@@ -41,18 +43,15 @@ def fingerprint(package: Path = Path(__file__).parent) -> str:
 
 
 def cache_root() -> Path:
-    """Where the folders of machine code stand: NUMBA_CACHE_DIR, else the user's cache folder."""
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return Path(chosen)
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    """Where the folders of machine code stand: a folder of our own in NUMBA_CACHE_DIR, else in the user's cache folder."""
+    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "verlet-numba"
 
 
 def _prune(root: Path, current: Path) -> None:
     """Machine code of earlier versions goes: all but the newest few folders of fingerprints."""
     try:
-        old = [entry for entry in root.iterdir() if len(entry.name) == 20 and entry != current and entry.is_dir()]
+        old = [entry for entry in root.iterdir() if OURS.fullmatch(entry.name) and entry != current and entry.is_dir()]
         for entry in sorted(old, key=lambda entry: entry.stat().st_mtime, reverse=True)[FOLDERS_KEPT - 1:]:
             shutil.rmtree(entry, ignore_errors=True)
     except OSError:

@@ -72,7 +72,7 @@ class Gravity(NamedTuple):
 
 
 class Wind(NamedTuple):
-    """Triangles of cloth, in runs of triangles that share no particle."""
+    """Triangles that the wind meets, in runs of triangles that share no particle."""
 
     first: Array                # (3, R) int 1
     lanes: Array                # (R,) int 1
@@ -102,8 +102,10 @@ class Paths(NamedTuple):
 class Carried(NamedTuple):
     """Pinned particles that follow a path."""
 
-    particle: Array             # (M,) int 1
-    start: Array                # (3, M) double m; position at the path's first knot
+    particle: Array             # (C,) int 1
+    path: Array                 # (C,) int 1; which path each follows
+    start: Array                # (3, C) double m; position at the path's first knot
+    shift: Array                # (3, M) double m; of each path now, since its first knot
     paths: Paths
 
 

@@ -21,6 +21,12 @@ QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnin
 VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Say more about what is done.")
 
 
+class Misuse(click.ClickException):
+    """Wrong usage that the words of the command line alone do not show."""
+
+    exit_code = WRONG
+
+
 def show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
     if wanted and not context.resilient_parsing:
         from importlib.metadata import version
@@ -33,7 +39,7 @@ def show_version(context: click.Context, parameter: click.Parameter, wanted: boo
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.option("--version", is_flag=True, callback=show_version, expose_value=False, is_eager=True,
               help="Versions of the program, of its files and of Numba.")
-@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error; may also stand behind the command.")
 def cli(debug: bool) -> None:
     """Position-based (Verlet) simulation of ropes, cloth and rigid bodies: YAML scenes in, HDF5 trajectories out."""
 
@@ -71,7 +77,8 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
     elif not quiet:
         click.echo(describe(summary))
     if summary.divergence is not None:
-        say(f"{scene}: {summary.divergence}. {summary.frames} good frames are kept in {output}")
+        kept = f"{summary.frames} good frames are kept in {output}" if summary.frames else "No frame was good: no file was written"
+        say(f"{scene}: {summary.divergence}. {kept}")
         raise SystemExit(DIVERGED)
     if summary.signal is not None:
         say(f"{scene}: stopped by a signal; {summary.frames} frames are kept in {output}")
@@ -150,21 +157,25 @@ def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
 def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) -> None:
     """Draw TRAJECTORY without a display: a sheet of pictures or an animation."""
     refuse_existing(output, overwrite)
+    from verlet_numba.study.render import RenderError
     from verlet_numba.study.render import render as draw
 
-    draw(trajectory, output, frames=chosen(frames))
+    try:
+        draw(trajectory, output, frames=chosen(frames))
+    except RenderError as error:
+        raise Misuse(str(error)) from error
 
 
-def chosen(frames: str | None) -> list[int] | None:
-    """Numbers and ranges FIRST:END:STEP (END not included), separated by commas."""
+def chosen(frames: str | None) -> list[int | slice] | None:
+    """Numbers and ranges FIRST:END:STEP (END not included), separated by commas; negative ones count from the end."""
     if frames is None:
         return None
-    numbers: list[int] = []
+    numbers: list[int | slice] = []
     for part in frames.split(","):
-        if not re.fullmatch(r"\s*\d+(:\d+(:[1-9]\d*)?)?\s*", part):
+        if not re.fullmatch(r"\s*(-?\d{1,18}|-?\d{0,18}:-?\d{0,18}(:[1-9]\d{0,17})?)\s*", part):
             raise click.BadParameter(f"{part!r} is neither a frame nor a range FIRST:END:STEP", param_hint="--frames")
-        bounds = [int(word) for word in part.split(":")]
-        numbers += [bounds[0]] if len(bounds) == 1 else range(*bounds)
+        bounds = [int(word) if word.strip() else None for word in part.split(":")]
+        numbers.append(int(part) if len(bounds) == 1 else slice(*bounds))
     return numbers
 
 
@@ -177,11 +188,11 @@ def default_name(scene: Any, path: Path) -> str:
 def refuse_existing(output: Path, overwrite: bool) -> None:
     """Before any work: nothing that exists is overwritten unasked, and the folder must be there."""
     if output.exists() and not overwrite:
-        raise click.ClickException(f"{output} exists already; give another with -o, or --overwrite")
+        raise Misuse(f"{output} exists already; give another with -o, or --overwrite")
     if output.is_dir():
-        raise click.ClickException(f"{output} is a folder; name a file with -o")
+        raise Misuse(f"{output} is a folder; name a file with -o")
     if not output.parent.is_dir():
-        raise click.ClickException(f"{output.parent} is no folder; make it first, or give another with -o")
+        raise Misuse(f"{output.parent} is no folder; make it first, or give another with -o")
 
 
 def say(text: str) -> None:
@@ -240,15 +251,16 @@ def main() -> None:
     """Run the command line; every error ends in a message and the contract's exit code."""
     from verlet_numba.scene.problems import SceneError
 
+    arguments = [word for word in sys.argv[1:] if word != "--debug"]
     try:
-        cli.main(prog_name="verlet-numba", standalone_mode=False)
+        cli.main(arguments, prog_name="verlet-numba", standalone_mode=False)
     except SceneError as error:
         fail(error, WRONG, str(error))
     except click.UsageError as error:
         error.show()
         sys.exit(WRONG)
     except click.ClickException as error:
-        fail(error, FAILED, f"verlet-numba: {error.format_message()}")
+        fail(error, error.exit_code, f"verlet-numba: {error.format_message()}")
     except (click.Abort, KeyboardInterrupt) as error:
         fail(error, INTERRUPTED, "verlet-numba: interrupted")
     except MemoryError as error:

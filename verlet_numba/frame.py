@@ -21,15 +21,15 @@ from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
 
-OK, DIVERGED, FULL = 0, 1, 2
+OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 
 
 @kernel
-def advance(world, frames):
+def advance(world, frames, budget):
     """A chunk of frames. A frame is kept at its time and finished one substep later, so that its velocity is central.
 
-    Returns OK, DIVERGED (the frame of the clock is not a number) or FULL (the contacts outgrew their buffers). After
-    FULL, and with larger buffers, the next call takes the substep up where it stopped, bit for bit.
+    Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
+    outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
     particles, runs, runs_softness, sticks, sticks_softness, angles, effects, solver, observed, snapshot, clock = world
     position, previous, inverse_mass, acceleration = particles
@@ -38,6 +38,9 @@ def advance(world, frames):
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
             if clock[STAGE] == WHOLE:
+                if budget == 0:
+                    return PAUSED
+                budget -= 1
                 end = (clock[NUMBER] + 1) * h
                 if clock[SUBSTEP] == substeps - 1:
                     keep(position, previous, snapshot, touching(contact))
@@ -60,7 +63,7 @@ def advance(world, frames):
                 shove(position, inverse_mass, contact, rigid)
                 snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
                 snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
-                snapshot.counts[0] += relax_angles(position, inverse_mass, angles)
+                snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
             bounce(position, previous, contact, restitution)
             rebound(position, previous, inverse_mass, contact, restitution, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word

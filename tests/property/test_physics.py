@@ -75,7 +75,7 @@ def test_a_correction_has_no_torque(seed):
     for c in range(0, len(world.sticks.rest), 5):
         one = type(world.sticks)(*(np.ascontiguousarray(array[..., c:c + 1]) for array in world.sticks))
         relaxed(relax_sticks, one, None, None, None)
-    relaxed(relax_angles, w, world.angles)
+    relaxed(relax_angles, w, world.angles, None)
 
 
 @given(seed=SEEDS, shift=st.tuples(*[st.floats(-20, 20)] * 3))

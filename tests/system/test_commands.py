@@ -133,7 +133,7 @@ def test_render_draws_a_sheet(verlet, mixed, tmp_path):
         assert image.format == "PNG"
         assert len(image.getcolors(1 << 24)) > 100
     before = (tmp_path / "x.png").read_bytes()
-    assert "exists already" in verlet("render", mixed.trajectory, "-o", tmp_path / "x.png", code=1).stderr
+    assert "exists already" in verlet("render", mixed.trajectory, "-o", tmp_path / "x.png", code=2).stderr
     assert (tmp_path / "x.png").read_bytes() == before
 
 

@@ -213,7 +213,7 @@ def test_nothing_is_overwritten_unasked(mixed, verlet, tmp_path):
     """Refused before anything is simulated: with a frame rate at which the run would take an hour."""
     output = tmp_path / "mixed.vtkhdf"
     output.write_bytes(b"precious")
-    done = verlet("run", mixed.scene, "--set", "time.duration=90000", cwd=tmp_path, code=1)
+    done = verlet("run", mixed.scene, "--set", "time.duration=90000", cwd=tmp_path, code=2)
     assert done.stdout == ""
     assert "mixed.vtkhdf exists already" in done.stderr
     assert "--overwrite" in done.stderr
@@ -225,9 +225,9 @@ def test_nothing_is_overwritten_unasked(mixed, verlet, tmp_path):
 
 def test_output_folders_that_cannot_be_used(mixed, verlet, tmp_path):
     (tmp_path / "file").write_text("")
-    for output, words in ((tmp_path / "none" / "x.vtkhdf", "no folder"), (tmp_path / "file" / "x.vtkhdf", "no folder"),
-                          (tmp_path, "folder"), (Path("/proc/x.vtkhdf"), "/proc")):
-        done = verlet("run", mixed.scene, "-q", "--overwrite", "-o", output, code=1)
+    for output, words, code in ((tmp_path / "none" / "x.vtkhdf", "no folder", 2), (tmp_path / "file" / "x.vtkhdf", "no folder", 2),
+                                (tmp_path, "folder", 2), (Path("/proc/x.vtkhdf"), "/proc", 1)):
+        done = verlet("run", mixed.scene, "-q", "--overwrite", "-o", output, code=code)
         assert words in done.stderr
         assert len(done.stderr.splitlines()) == 1
 

@@ -31,7 +31,7 @@ def functions(model):
     """Functions of the package in the frame loop of a model, inlined ones too: each leaves its environment behind."""
     chunk = frames(model, 0)
     run_chunk(model, chunk)
-    overload = advance.overloads[typeof(model.world), typeof(chunk)]
+    overload = advance.overloads[typeof(model.world), typeof(chunk), typeof(1)]
     text = str(overload.library._get_module_for_linking())      # the public inspect_llvm is empty for cached code
     found = set()
     for mangled in re.findall(r"NumbaEnv[\w$.]*?12verlet_numba([\w$.]*)", text):

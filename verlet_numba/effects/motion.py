@@ -8,9 +8,13 @@ from verlet_numba.physics.pose import turn
 def along(paths, m, time):
     """The point of path m at a time: piecewise linear, constant before the first and after the last knot."""
     first, last = paths.first[m], paths.first[m + 1] - 1
-    knot = first
-    while knot < last and paths.time[knot + 1] <= time:
-        knot += 1
+    knot, beyond = first, last + 1              # the last knot that is not later than `time`, by bisection
+    while beyond - knot > 1:
+        middle = (knot + beyond) // 2
+        if paths.time[middle] <= time:
+            knot = middle
+        else:
+            beyond = middle
     if knot == last or time <= paths.time[first]:
         return paths.point[0, knot], paths.point[1, knot], paths.point[2, knot]
     s = (time - paths.time[knot]) / (paths.time[knot + 1] - paths.time[knot])
@@ -24,13 +28,13 @@ def carry(position, time, carried):
     """Bring pinned particles to where their path is at `time` [s], carried by its displacement since its first knot."""
     if carried is None:
         return
-    paths = carried.paths
-    for m in range(carried.particle.size):
-        k, first = carried.particle[m], paths.first[m]
-        point = along(paths, m, time)
-        position[0, k] = carried.start[0, m] + (point[0] - paths.point[0, first])
-        position[1, k] = carried.start[1, m] + (point[1] - paths.point[1, first])
-        position[2, k] = carried.start[2, m] + (point[2] - paths.point[2, first])
+    paths, shift, particle, path, start = carried.paths, carried.shift, carried.particle, carried.path, carried.start
+    for m in range(shift.shape[1]):
+        first, (x, y, z) = paths.first[m], along(paths, m, time)
+        shift[0, m], shift[1, m], shift[2, m] = x - paths.point[0, first], y - paths.point[1, first], z - paths.point[2, first]
+    for c in range(particle.size):
+        for axis in range(3):
+            position[axis, particle[c]] = start[axis, c] + shift[axis, path[c]]
 
 
 @kernel

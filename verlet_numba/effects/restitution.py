@@ -54,7 +54,7 @@ def bounce(position, previous, contact, restitution):
         k = particle[c]
         if rebound[c] > 0.0 and push[c] > 0.0 and body[k] < 0:
             excess = approach(normal, anchor, c, x[k], y[k], z[k]) - rebound[c]
-            push[c] -= excess
+            push[c] += max(0.0, -excess)
             u[k] += excess * normal[0, c]
             v[k] += excess * normal[1, c]
             w[k] += excess * normal[2, c]

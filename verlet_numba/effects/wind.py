@@ -1,7 +1,9 @@
-"""Wind on the triangles of cloth, each corner taking a third of the force."""
+"""Wind on the triangles of all bodies, each corner taking a third of the force."""
 
 from verlet_numba._jit import kernel
 from verlet_numba.physics.wind import pressure
+
+VALENCE = 6.0       # triangles about a corner: as many accelerate it together
 
 
 @kernel
@@ -15,7 +17,7 @@ def blow(position, previous, acceleration, h, wind):
     x, y, z = position[0], position[1], position[2]
     u, v, w = previous[0], previous[1], previous[2]
     a, b, c = acceleration[0], acceleration[1], acceleration[2]
-    zero, per = position.dtype.type(0), position.dtype.type(1.0 / (3.0 * h))
+    zero, per, half = position.dtype.type(0), position.dtype.type(1.0 / (3.0 * h)), position.dtype.type(0.5 * VALENCE * h)
     for r in range(wind.lanes.size):
         i, j, k, n, d = wind.first[0, r], wind.first[1, r], wind.first[2, r], wind.lanes[r], wind.data[r]
         xi, yi, zi, ui, vi, wi = x[i:i + n], y[i:i + n], z[i:i + n], u[i:i + n], v[i:i + n], w[i:i + n]
@@ -30,7 +32,8 @@ def blow(position, previous, acceleration, h, wind):
             ry = ay[m] - per * ((yi[m] - vi[m]) + (yj[m] - vj[m]) + (yk[m] - vk[m]))
             rz = az[m] - per * ((zi[m] - wi[m]) + (zj[m] - wj[m]) + (zk[m] - wk[m]))
             fx, fy, fz = pressure(xj[m] - xi[m], yj[m] - yi[m], zj[m] - zi[m],
-                                  xk[m] - xi[m], yk[m] - yi[m], zk[m] - zi[m], rx, ry, rz, zero)
+                                  xk[m] - xi[m], yk[m] - yi[m], zk[m] - zi[m], rx, ry, rz,
+                                  half * max(si[m], sj[m], sk[m]), zero)
             ai[m] += si[m] * fx
             bi[m] += si[m] * fy
             ci[m] += si[m] * fz

@@ -3,7 +3,7 @@
 With unit arms u (length a) and v (length b), e the unit normal of u in their plane towards v, and
 f = sin(theta) u - cos(theta) e the unit normal of v towards u, moving x_i along e by s lessens theta by s / a and
 moving x_k along f by s lessens it by s / b. The gradients -e/a and -f/b, and at x_j minus their sum, are those of a
-function that no rigid motion changes: linear and angular momentum are kept.
+function that no rigid motion changes: the displacements have no sum and no moment about the present positions.
 """
 
 import math
@@ -32,11 +32,11 @@ def any_normal(x, y, z):
 
 
 @formula
-def bend(ux, uy, uz, vx, vy, vz, rest, w_i, w_j, w_k):
+def bend(ux, uy, uz, vx, vy, vz, rest, slack, w_i, w_j, w_k):
     """Displacements of x_i and x_k [m] that bring the angle to `rest` [rad] to first order, and what x_j moves.
 
     (ux, uy, uz), (vx, vy, vz): arms [m] from x_j; w: inverse masses [1/kg]. Returns nine numbers: of i, j, k.
-    An arm of length zero, or three immovable particles, are left alone.
+    An arm of length zero, three immovable particles, or an angle within the relative tolerance `slack` are left alone.
     """
     ux, uy, uz, a = unit(ux, uy, uz)
     vx, vy, vz, b = unit(vx, vy, vz)
@@ -53,6 +53,9 @@ def bend(ux, uy, uz, vx, vy, vz, rest, w_i, w_j, w_k):
     total = w_i / (a * a) + w_k / (b * b) + w_j * (jx * jx + jy * jy + jz * jz)
     if total == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    s = -(math.atan2(sine, cosine) - rest) / total
+    error = math.atan2(sine, cosine) - rest
+    if abs(error) < slack * rest:
+        error = 0.0
+    s = -error / total
     i, j, k = s * w_i, s * w_j, s * w_k
     return i * ix, i * iy, i * iz, j * jx, j * jy, j * jz, k * kx, k * ky, k * kz

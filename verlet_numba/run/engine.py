@@ -1,5 +1,7 @@
 """The frame loop as Python sees it: start a model, advance it by a chunk of frames, take its state back."""
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +11,13 @@ from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.wind import blow
-from verlet_numba.frame import FULL, advance
+from verlet_numba.frame import FULL, OK, PAUSED, advance
 from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
 from verlet_numba.scene.colliders import room
+
+BUDGET = 64                 # substeps between two looks at signals, at first
+PAUSE_SECONDS = 0.1         # the budget doubles while it is done sooner
 
 
 def start(model: Model) -> Model:
@@ -80,15 +85,34 @@ def grown(world: World) -> World:
     return world._replace(effects=effects._replace(contact=contact, restitution=restitution, rigid=rigid))
 
 
-def run_chunk(model: Model, chunk: Frames) -> int:
-    """The next len(chunk.measures) frames. Returns OK, or DIVERGED with the clock's FRAME at the first that is not sound."""
+def run_chunk(model: Model, chunk: Frames, stop: Callable[[], object] = bool) -> int:
+    """The next len(chunk.measures) frames; `stop` is asked every so often whether to leave off.
+
+    Returns OK, or DIVERGED with the clock's FRAME at the first that is not sound, or PAUSED with it at the first that is
+    not done.
+    """
     first = model.world.clock[NUMBER] == 0 and len(chunk.measures) > 0
     model.world.clock[FRAME] = 0
-    while (status := advance(model.world, chunk)) == FULL:
-        model.world = grown(model.world)
-    if first:
+    budget = BUDGET
+    while True:
+        clock = time.perf_counter()
+        status = advance(model.world, chunk, budget)
+        if status == FULL:
+            model.world = grown(model.world)
+        elif status != PAUSED or stop():
+            break
+        elif time.perf_counter() - clock < PAUSE_SECONDS:
+            budget *= 2
+    if first and (status == OK or model.world.clock[FRAME] > 0):
         restate(model, chunk)
     return int(status)
+
+
+def warm(model: Model) -> None:
+    """Make or load the machine code of everything that a run of the model calls, by one frame that is then undone."""
+    before = State.of(model)
+    run_chunk(model, frames(model, 1))
+    before.restore(model)
 
 
 def run_substep(model: Model) -> None:

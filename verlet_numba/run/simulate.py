@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from verlet_numba.buffers import CONTACTS, ERROR_MAX, FRAME, PENETRATION, RELAXATIONS, Array, Frames
-from verlet_numba.frame import DIVERGED
+from verlet_numba.frame import DIVERGED, OK
 from verlet_numba.run.contents import contents, now, observables
-from verlet_numba.run.engine import State, run_chunk, start
+from verlet_numba.run.engine import State, run_chunk, start, warm
 from verlet_numba.run.postmortem import Divergence, examine
 from verlet_numba.run.progress import Progress
 from verlet_numba.run.signals import StopSignals
@@ -71,25 +71,24 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     clock = time.perf_counter()
     model = build(prepared.scene, prepared.bodies)
     total = frame_count(prepared.scene) if count is None else count + 1
-    with TrajectoryFile(output, contents(prepared, model, command), total, overwrite, beside=threads > 1) as file:
-        summary.seconds["build"] = time.perf_counter() - clock
-        with Progress(total, prepared.scene.solver.substeps, quiet) as progress, StopSignals() as signals:
-            compile_kernels(model, progress, summary)
-            signals.at_once = False
+    summary.seconds["build"] = time.perf_counter() - clock
+    with Progress(total, prepared.scene.solver.substeps, quiet) as progress:
+        compile_kernels(model, progress, summary)
+        with StopSignals() as signals, TrajectoryFile(output, contents(prepared, model, command), total, overwrite,
+                                                      beside=threads > 1) as file:
             advance_all(model, file, total, progress, summary, signals)
-        clock = time.perf_counter()
-        file.flush()
-        summary.seconds["write"] += time.perf_counter() - clock
-        file.finish(summary.status, now(), summary.timing())
+            clock = time.perf_counter()
+            file.flush()
+            summary.seconds["write"] += time.perf_counter() - clock
+            file.finish(summary.status, now(), summary.timing())
     return summary
 
 
 def compile_kernels(model: Model, progress: Progress, summary: Summary) -> None:
-    """Make or load the machine code of this scene's frame loop by a chunk of no frames, and put the model at its start."""
+    """Make or load the machine code of this scene's run, and put the model at its start."""
     clock = time.perf_counter()
     progress.may_compile()
-    start(model)
-    run_chunk(model, frames(model, 0))
+    warm(start(model))
     progress.compiled()
     summary.seconds["compile"] = time.perf_counter() - clock
 
@@ -100,15 +99,15 @@ def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progre
     summary.seconds.update(simulate=0.0, write=0.0)
     most = max(1, CHUNK_BYTES // frame_bytes(model))
     size, chunk = 1, frames(model, 1)
-    while summary.frames < total and summary.divergence is None and not signals.received:
+    while summary.frames < total and summary.divergence is None and not signals.stop():
         size = min(size, most, total - summary.frames)
         if size != len(chunk.measures):
             chunk = frames(model, size)
         before = State.of(model)
         clock = time.perf_counter()
-        status = run_chunk(model, chunk)
+        status = run_chunk(model, chunk, signals.stop)
         took = time.perf_counter() - clock
-        sound = int(model.world.clock[FRAME]) if status == DIVERGED else size
+        sound = size if status == OK else int(model.world.clock[FRAME])
         clock = time.perf_counter()
         store(model, file, chunk, sound, summary)
         wrote = time.perf_counter() - clock
@@ -120,8 +119,8 @@ def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progre
             summary.status = BROKEN
             summary.divergence = examine(model, before, (sound + 2) * model.world.solver.substeps)
         size = next_size(size, took)
-    if signals.received and summary.status == COMPLETE and summary.frames < total:
-        summary.status, summary.signal = STOPPED, signals.received
+    if signals.number and summary.status == COMPLETE and summary.frames < total:
+        summary.status, summary.signal = STOPPED, signals.number
 
 
 def next_size(size: int, took: float) -> int:

@@ -4,8 +4,8 @@ import time
 from pathlib import Path
 
 from verlet_numba._jit import CACHE
-from verlet_numba.run.engine import run_chunk, start
-from verlet_numba.scene.build import build, frames
+from verlet_numba.run.engine import start, warm
+from verlet_numba.scene.build import build
 from verlet_numba.scene.prepare import Prepared
 
 PLACES = (Path(__file__).parents[1] / "scenes", Path(__file__).parents[2] / "scenes")    # installed; in a clone
@@ -22,6 +22,5 @@ def paper_scenes() -> list[Path]:
 def warm_up(prepared: Prepared) -> tuple[float, Path]:
     """Compile, or load from the cache, everything a scene needs. Returns seconds and the cache's folder."""
     clock = time.perf_counter()
-    model = start(build(prepared.scene, prepared.bodies))
-    run_chunk(model, frames(model, 0))
+    warm(start(build(prepared.scene, prepared.bodies)))
     return time.perf_counter() - clock, CACHE

@@ -114,10 +114,12 @@ def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
         if body.path is not None:
             particles.append(index[:, body.pinned].ravel())
             starts.append(body.positions[:, body.pinned].reshape(-1, 3))
-            points += [body.path] * particles[-1].size
+            points.append(body.path)
     if not points:
         return None
-    return Carried(gate(np.concatenate(particles), np.int64), gate(np.concatenate(starts).T, np.float64), paths(points))
+    path = np.repeat(np.arange(len(points)), [len(each) for each in particles])
+    return Carried(gate(np.concatenate(particles), np.int64), gate(path, np.int64), gate(np.concatenate(starts).T, np.float64),
+                   gate(np.zeros((3, len(points))), np.float64), paths(points))
 
 
 class Contact(NamedTuple):

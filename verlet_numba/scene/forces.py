@@ -38,8 +38,8 @@ def damping(effects: Effects, inverse_mass: Floats, real: Any) -> Damping | None
 
 
 def wind(effects: Effects, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Wind | None:
-    """Wind on the triangles of every cloth; None if the scene has none."""
-    groups = [group for group in numbering.groups if group.shape.kind == "cloth" and len(group.shape.triangles)]
+    """Wind on the triangles of every body; None if the scene has none."""
+    groups = [group for group in numbering.groups if len(group.shape.triangles)]
     if effects.wind is None or not groups:
         return None
     firsts, counts, shares = [], [], []

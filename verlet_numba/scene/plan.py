@@ -63,12 +63,12 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     """Every phase of a substep in its order."""
     scene, world = prepared.scene, model.world
     effects, active = scene.effects, world.effects
-    cloth = any(body.shape.kind == "cloth" for body in prepared.bodies)
+    faces = any(len(body.shape.triangles) for body in prepared.bodies)
     named, unnamed = "named in effects", "not named in effects"
     moves = bool((world.particles.inverse_mass > 0).any())
     yield Phase("gravity", active.gravity is not None, named if effects.gravity else unnamed)
     yield Phase("wind", active.wind is not None,
-                unnamed if effects.wind is None else named if cloth else "named, but no body has triangles of cloth")
+                unnamed if effects.wind is None else named if faces else "named, but no body has triangles")
     yield Phase("drag", active.drag is not None, named if effects.drag else unnamed)
     yield Phase("damping", active.damping is not None, named if effects.damping is not None else unnamed)
     yield Phase("integrate", moves, "particles move" if moves else "nothing can move")
@@ -79,6 +79,8 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
     yield Phase("whole-body response", active.rigid is not None, "rigid bodies without pins meet colliders" if active.rigid
                 else "no rigid body without pins meets a collider")
+    for name in ("self-collision", "continuous collision", "bending", "rest", "orientation guard"):
+        yield Phase(name, False, "not simulated yet")
     yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other"
                 if sum(body.copies for body in prepared.bodies) > 1 else "there is one body at most")
     yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))

@@ -19,6 +19,7 @@ from .schema_common import (
     Rotation,
     Sides,
     Speed,
+    StickLength,
     Switch,
     Thickness,
     Trajectory,
@@ -48,7 +49,7 @@ PinnedCloth = Annotated[
 PinnedRope = Annotated[Annotated[Numbers, Tag("<numbers>")] | Annotated[Literal["ends"], Tag("<word>")], _PINNED]
 
 Stick = Annotated[
-    Annotated[tuple[Whole, Whole], Tag("<2>")] | Annotated[tuple[Whole, Whole, Thickness], Tag("<3>")],
+    Annotated[tuple[Whole, Whole], Tag("<2>")] | Annotated[tuple[Whole, Whole, StickLength], Tag("<3>")],
     Discriminator(_row_of(2, 3), "row", "a stick is [i, j] or [i, j, length]: two particle numbers, and a length in m")]
 Degrees = Annotated[Number, Field(ge=0, le=180)]
 Angle = Annotated[
@@ -81,7 +82,7 @@ class BaseBody(Part):
     position: Vector = Field(default=(0.0, 0.0, 0.0), description="where the body's own origin is put, m")
     rotation: Rotation | None = Field(
         default=None, description="turn from the body's own axes to those of the world, about the centre of mass of "
-                                  "box and icosahedron, else about the body's own origin")
+                                  "ropes, boxes, icosahedra and particles, else about the body's own origin")
     velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="initial velocity of the centre of mass, m/s")
     angular_velocity: Vector = Field(default=(0.0, 0.0, 0.0), description="about the centre of mass, world axes, rad/s")
     count: Annotated[Integer, Field(ge=1, le=1_000_000)] = Field(
@@ -187,6 +188,8 @@ class Rope(MassOrDensity):
             yield ("end",), "is where the rope starts; move it, or say how long the rope is with `length`"
         elif self.length < distance * (1 - 1e-12):
             yield ("length",), f"{self.length:g} m is shorter than the {distance:g} m from start to end"
+        elif self.segments == 1 and self.length > distance * (1 + 1e-12):
+            yield ("segments",), f"one segment cannot be slack: it is {self.length:g} m long over {distance:g} m"
 
 
 class Box(MassOrDensity):

@@ -60,6 +60,13 @@ def _invertible(mass: float) -> float:
 
 
 Mass = Annotated[Number, Field(gt=0, le=1e30), AfterValidator(_invertible)]
+def _comparable(length: float) -> float:
+    if 0 < length < 1e-30:
+        raise PydanticCustomError("length", "is too small to be a length: it must be 0, or at least 1e-30")
+    return length
+
+
+StickLength = Annotated[Thickness, AfterValidator(_comparable)]
 Direction = Annotated[Vector, AfterValidator(_directed)]
 Trajectory = Annotated[tuple[Waypoint, ...], Field(min_length=1), AfterValidator(_rising)]
 

@@ -27,7 +27,7 @@ class RenderError(Exception):
     """A picture that cannot be made; one line says why and what to do."""
 
 
-def render(path: str | Path, output: str | Path, frames: Sequence[int] | None = None, width: int = 560,
+def render(path: str | Path, output: str | Path, frames: Sequence[int | slice] | None = None, width: int = 560,
            height: int = 420) -> list[int]:
     """Draw frames of a trajectory to `output` and return which.
 
@@ -54,17 +54,24 @@ def render(path: str | Path, output: str | Path, frames: Sequence[int] | None = 
     return chosen
 
 
-def choose(trajectory: Trajectory, frames: Sequence[int] | None, most: int) -> list[int]:
-    """The frames asked for, negative ones counted from the end, or at most `most`, evenly spread."""
+def choose(trajectory: Trajectory, frames: Sequence[int | slice] | None, most: int) -> list[int]:
+    """The frames asked for, negative ones counted from the end, slices cut to what there is; or at most `most`, evenly spread."""
     count = len(trajectory)
     if count == 0:
         raise RenderError(f"{trajectory.path}: has no frames")
     if frames is None:
         return [int(frame) for frame in np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))]
+    chosen: list[int] = []
     for frame in frames:
-        if not -count <= frame < count:
+        if isinstance(frame, slice):
+            chosen += range(count)[frame]
+        elif -count <= frame < count:
+            chosen.append(frame % count)
+        else:
             raise RenderError(f"{trajectory.path}: there is no frame {frame}: it has {count}, counted from 0")
-    return [frame % count for frame in frames]
+    if not chosen:
+        raise RenderError(f"{trajectory.path}: has none of these frames: it has {count}, counted from 0")
+    return chosen
 
 
 class View:

@@ -76,7 +76,7 @@ def test_wind_in_runs_of_triangles(particles):
     blow(*state(particles), H, Wind(first, lanes, np.cumsum(lanes) - lanes, velocity.astype(real), share.astype(real)))
     for c, triangle in enumerate(triangles.T):
         if c != 7:
-            force = wind_force(x[triangle], d[triangle] / H, velocity[:, c], density)
+            force = wind_force(x[triangle], d[triangle] / H, velocity[:, c], density, particles.inverse_mass[triangle], H)
             a[triangle] += particles.inverse_mass[triangle, None] * force / 3
     agree(particles, a)
 

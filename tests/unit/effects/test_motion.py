@@ -23,7 +23,7 @@ def test_paths_are_straight_between_knots_and_rest_before_and_after(m, time):
 @pytest.mark.parametrize("real", [np.float64, np.float32])
 def test_pinned_particles_are_carried_by_the_displacement_since_the_first_knot(real):
     start = np.random.default_rng(0).normal(size=(3, 2))
-    carried = Carried(np.array([4, 1]), start, paths(KNOTS))
+    carried = Carried(np.array([4, 1]), np.array([0, 1]), start, np.zeros((3, 2)), paths(KNOTS))
     position = np.zeros((3, 6), real)
     carry(position, 1.25, carried)
     expected = np.zeros((3, 6))

@@ -13,7 +13,7 @@ def angle_of(x):
 
 def moved(x, rest, w):
     """Displacements (3, 3) of the three particles x (3, 3)."""
-    return np.array(bend(*(x[0] - x[1]), *(x[2] - x[1]), rest, *w)).reshape(3, 3)
+    return np.array(bend(*(x[0] - x[1]), *(x[2] - x[1]), rest, 0.0, *w)).reshape(3, 3)
 
 
 def triples(count=200):
