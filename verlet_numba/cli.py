@@ -216,9 +216,14 @@ def describe(summary: Any) -> str:
         f"  speed             {summary.steps_per_second:,.0f} steps/s, {summary.real_time_factor:,.1f} times real time",
         f"  relaxations       {summary.relaxations:,}",
         f"  contacts          {summary.contacts} at most",
-        f"  constraint error  {summary.constraint_error_max:.3g} at most",
+        f"  constraint error  {summary.constraint_error_max:.3g} of a length at most" + stretched(summary.constraint_error_max),
         f"  penetration       {summary.penetration_max:.3g} m at most",
         f"  time              {seconds}"])
+
+
+def stretched(error: float) -> str:
+    """A word on sticks that are far off their lengths."""
+    return ": sticks stretch; more substeps keep them stiffer, or they are compliant" if error > 0.05 else ""
 
 
 def describe_plan(found: dict[str, Any]) -> Iterable[str]:
