@@ -64,4 +64,19 @@ def resolved(scene: Scene) -> dict[str, Any]:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of scene files: every key, its description, bounds and default."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema(by_alias=True)}
+    schema: dict[str, Any] = _bounded(Scene.model_json_schema(by_alias=True))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+_BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
+
+
+def _bounded(node: Any) -> Any:
+    """The schema with the bounds that pydantic leaves under its own names, behind a converter, under those of JSON Schema."""
+    if isinstance(node, list):
+        return [_bounded(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    renamed = {key: value for key, value in node.items() if key not in _BOUNDS}
+    renamed |= {_BOUNDS[key]: value for key, value in node.items() if key in _BOUNDS}
+    return {key: _bounded(value) for key, value in renamed.items()}

@@ -40,6 +40,8 @@ def render(path: str | Path, output: str | Path, frames: Sequence[int | slice] |
     if output.suffix.lower() not in (".png", ".gif"):
         raise RenderError(f"{output}: cannot write {output.suffix or 'a file without suffix'}; use .png or .gif")
     with reader.open(path) as trajectory:
+        if trajectory.particles == 0:
+            raise RenderError(f"{path}: has no particles, so there is nothing to draw")
         chosen = choose(trajectory, frames, GIF_FRAMES if output.suffix.lower() == ".gif" else SHEET_FRAMES)
         title = str(trajectory.scene.get("name") or Path(path).stem)
         try:

@@ -198,3 +198,10 @@ def test_loading_needs_no_heavy_library() -> None:
             "print(sorted(heavy & set(sys.modules)))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_bounds_of_the_json_schema_are_those_of_json_schema():
+    output = json_schema()["$defs"]["Output"]["properties"]["precision_bits"]
+    assert (output["minimum"], output["maximum"]) == (1, 24)
+    text = json.dumps(json_schema())
+    assert not any(f'"{key}": ' in text for key in ("ge", "gt", "le", "lt"))
