@@ -144,8 +144,8 @@ def test_render_draws_an_animation(verlet, mixed, tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
-    (["-o", "x.jpg"], 1, ".png"), (["-o", "x.png", "--frames", "31"], 1, "no frame 31"),
-    (["-o", "x.png", "--frames", "last"], 2, "--frames"), (["-o", "none/x.png"], 1, "none")])
+    (["-o", "x.jpg"], 2, ".png"), (["-o", "x.png", "--frames", "31"], 2, "no frame 31"),
+    (["-o", "x.png", "--frames", "last"], 2, "--frames"), (["-o", "none/x.png"], 2, "none")])
 def test_render_says_what_it_cannot(verlet, mixed, tmp_path, arguments, code, words):
     assert words in verlet("render", mixed.trajectory, *arguments, cwd=tmp_path, code=code).stderr
     assert list(tmp_path.iterdir()) == []
