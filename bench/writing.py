@@ -74,8 +74,8 @@ def frames_that_take(seconds: float, scene: Prepared) -> int:
 def chunks_seen(tell: Callable[[int], Any]) -> Iterator[None]:
     """Tells the number of frames of every chunk that `simulate` has simulated."""
 
-    def seen(model: Model, chunk: Frames) -> int:
-        status = run_chunk(model, chunk)
+    def seen(model: Model, chunk: Frames, stop: Callable[[], object]) -> int:
+        status = run_chunk(model, chunk, stop)
         tell(len(chunk.measures))
         return status
 
