@@ -79,6 +79,10 @@ def relax_angle(x, w, corners, rest):
 
 # --- Forces -----------------------------------------------------------------------------------------------------------
 
+def joined(values):
+    return np.concatenate(list(values)).astype(float)
+
+
 def path_slope(path):
     """Velocity with which a path begins, if it begins at time 0."""
     if path is None or len(path) < 2 or path[0, 0] > 0:
@@ -132,7 +136,6 @@ class Twin:
         per_copy = [(body, copy) for body in bodies for copy in range(body.copies)]
         sizes = [len(body.pinned) for body, _ in per_copy]
         self.first = dict(zip([(id(body), copy) for body, copy in per_copy], np.cumsum([0, *sizes[:-1]]), strict=True))
-        joined = lambda values: np.concatenate(list(values)).astype(float)     # noqa: E731
         self.x = joined(body.positions[copy] for body, copy in per_copy)
         self.start = self.x.copy()
         self.mass = joined(body.shape.masses for body, _ in per_copy)

@@ -66,8 +66,11 @@ def cylinder(axis, radius, half):
     return distance
 
 
+def unit(vector):
+    return np.array(vector, float) / np.linalg.norm(vector)
+
+
 def solids(collider):
-    unit = lambda vector: np.array(vector, float) / np.linalg.norm(vector)     # noqa: E731
     start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
     match collider.kind:
         case "plane":
@@ -132,8 +135,8 @@ def impact(before, after, a, h, e):
     rise = -e * (v + a * s)
     if rise <= 0 or rise + a * h / 2 <= 0:
         return 0.0, 0.0
-    flight = lambda tau: rise * tau + a * tau**2 / 2     # noqa: E731
-    return flight(h - s), flight(h - s) - flight(-s)
+    end, begin = (rise * tau + a * tau**2 / 2 for tau in (h - s, -s))
+    return end, end - begin
 
 
 def held(slide, push, static, dynamic):

@@ -81,11 +81,11 @@ def _cached(function: Function, **options: Any) -> Function:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(CACHE)
     try:
-        return numba.njit(cache=True, **FLAGS, **options)(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, **FLAGS, **options)(function)  # type: ignore[no-any-return]  # Numba has no types
     finally:
         config.CACHE_DIR = before
 
 
 def formula(function: Function) -> Function:
     """Compile a scalar formula that kernels inline; it needs no disk cache of its own."""
-    return numba.njit(**FLAGS)(function)  # type: ignore[no-any-return]
+    return numba.njit(**FLAGS)(function)  # type: ignore[no-any-return]  # likewise

@@ -168,7 +168,7 @@ class Trajectory:
     def _read(self, path: str, part: Any = ALL) -> Array:
         dataset = self._dataset(path)
         try:
-            return dataset[part]       # type: ignore[no-any-return]
+            return dataset[part]       # type: ignore[no-any-return]  # h5py has no types
         except (OSError, RuntimeError, ValueError, TypeError, MemoryError) as error:
             raise TrajectoryError(f"{self.path}: damaged: /{path} cannot be read ({error})") from error
 

@@ -71,7 +71,7 @@ colliders:
 output: {fields: [velocity], observables: true, precision: float32, precision_bits: 24}
 expect: [{measure: penetration_max, max: 0.01, tolerance: 0.001, from: 0.5, to: 2, body: crate}]
 reference: {measure: total_energy, value: 3.5, source: by hand}
-"""  # noqa: E501
+"""  # noqa: E501 - the scene as users read it, long rows included
 SMALL = "version: 1\ntime: {duration: 1}\n"
 
 
