@@ -164,6 +164,46 @@ class Rigid(NamedTuple):
     grip: Array                 # (3, L) double kg m; impulse of friction
 
 
+class Hulls(NamedTuple):
+    """Convex hulls that meet: of rigid bodies (their convex parts) and of colliders. Corners stand hull by hull.
+
+    A hull with a rounding is what lies within that distance of its corners' convex hull: one corner is a sphere.
+    """
+
+    body: Array                 # (H,) int 1; rigid body the hull belongs to (Rigid), -1: a collider's, which nothing moves
+    start: Array                # (H + 1,) int 1; columns of hull h: start[h] to start[h + 1], a whole number of vectors
+    size: Array                 # (H,) int 1; corners; columns after them repeat the first
+    particle: Array             # (Q,) int 1; inner index of the corner's particle, -1: a collider's
+    corner: Array               # (3, Q) double m; where the corners are
+    centre: Array               # (3, H) double m; mean of the corners
+    reach: Array                # (H,) double m; radius of the sphere about the centre that holds the hull, rounding included
+    rounding: Array             # (H,) double m
+    graph: Array                # (H,) int 1; first row of the hull's corners in `neighbours`, -1: corners are scanned
+    neighbours: Array           # (E + 1,) int 1; neighbours of the corner of row e: neighbour[neighbours[e]:neighbours[e + 1]]
+    neighbour: Array            # (U,) int 1; corner number within the hull
+
+
+class Pairs(NamedTuple):
+    """Pairs of hulls near each other, first < second, in ascending order; what each of them learnt stays with it."""
+
+    listed: Array               # (1,) int 1; how many pairs there are
+    first: Array                # (M,) int 1
+    second: Array               # (M,) int 1
+    axis: Array                 # (3, M) double 1; separating axis of the last substep, which starts the next; 0: none
+    face: Array                 # (6, M) int 1; hit face of the last substep: corner numbers of the first hull, of the second; -1: none
+
+
+class Meetings(NamedTuple):
+    """Contacts between hulls: points that are weighted corners of either."""
+
+    listed: Array               # (1,) int 1; how many there are
+    pair: Array                 # (T,) int 1; which of Pairs
+    corner: Array               # (6, T) int 1; columns of Hulls.corner: three of the first hull, three of the second
+    weight: Array               # (6, T) double 1; of each three the sum is 1
+    normal: Array               # (3, T) double 1; from the second hull to the first
+    gap: Array                  # (T,) double m; normal . (first point - second point) - roundings; negative: penetration
+
+
 class Friction(NamedTuple):
     particle: Array             # (2, n) real 1; static and dynamic
     solid: Array                # (2, K) double 1
