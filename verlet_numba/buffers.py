@@ -144,24 +144,44 @@ class Contacts(NamedTuple):
     bound: Array                # (L,) double m; normal . position must not be below it
     anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
     push: Array                 # (L,) double m; displacement along the normal given so far
-    after: Array                # (L,) int 1; next contact of the same rigid body, -1: none
 
 
 class Rigid(NamedTuple):
-    """Rigid bodies without pins, which answer to contacts as a whole."""
+    """What answers to contacts as a whole: rigid bodies, behind them particles that meet hulls in this substep, last the world.
 
-    first: Array                # (G,) int 1; inner index of the first particle
-    stride: Array               # (G,) int 1; from one particle to the next
-    size: Array                 # (G,) int 1; particles
-    head: Array                 # (G,) int 1; first contact of the substep, -1: untouched
-    order: Array                # (G,) int 1; bodies that are touched
-    touched: Array              # (1,) int 1; how many are
-    inverse_mass: Array         # (G,) double 1/kg
-    centre: Array               # (3, G) double m
-    inverse_inertia: Array      # (6, G) double 1/(kg m^2); xx, yy, zz, xy, xz, yz
-    wanted: Array               # (L,) double m; how far a contact has to rise
-    given: Array                # (L,) double m; pushes of a rebound
-    grip: Array                 # (3, L) double kg m; impulse of friction
+    A twist is a translation [m] and a rotation [rad] about the centre.
+    """
+
+    bodies: int                 # int 1; rigid bodies G; body b is entity b
+    first: Array                # (E,) int 1; inner index of the first particle
+    stride: Array               # (E,) int 1; from one particle to the next
+    size: Array                 # (E,) int 1; particles
+    reach: Array                # (E,) double m; from the centre to the farthest particle, 0 for single particles
+    entity: Array               # (n,) int 1; of a particle that is touched on its own, -1: none
+    touched: Array              # (1,) int 1; how many entities are touched in this substep
+    order: Array                # (E,) int 1; which
+    parent: Array               # (E,) int 1; of the forest of islands, -1: untouched
+    mass: Array                 # (E, 10) double SI; 1/mass, centre, inverse inertia (xx, yy, zz, xy, xz, yz)
+    step: Array                 # (E, 6) double SI; twist since the start of the substep, before contacts
+    twist: Array                # (E, 6) double SI; given by the contacts in this pass
+    moved: Array                # (E, 6) double SI; given in all passes of the substep
+    kick: Array                 # (E, 6) double SI; given to the velocity alone
+
+
+class Touches(NamedTuple):
+    """Contacts between entities, gathered from Contacts and Meetings; an island is what hangs together by them."""
+
+    until: Array                # (3,) int 1; where the touches of colliders, hulls, and particles with hulls end
+    islands: Array              # (1,) int 1; how many islands
+    first: Array                # (T,) int 1; entity
+    second: Array               # (T,) int 1; entity, the last one is the world
+    source: Array               # (T,) int 1; contact with a collider, or meeting
+    order: Array                # (T,) int 1; touches island by island
+    island: Array               # (T + 1,) int 1; where each island begins in `order`
+    label: Array                # (E,) int 1; number of the island by its root
+    line: Array                 # (T, 12) double SI; normal from second to first, arms of first and second, slide since the start
+    answer: Array               # (T, 5) double SI; wish [m], 1/response [kg], static and dynamic friction, separation to leave with [m]
+    given: Array                # (T, 6) double kg m; push, grip (3), kick along the normal, impact
 
 
 class Hulls(NamedTuple):
@@ -176,6 +196,8 @@ class Hulls(NamedTuple):
     particle: Array             # (Q,) int 1; inner index of the corner's particle, -1: a collider's
     corner: Array               # (3, Q) double m; where the corners are
     centre: Array               # (3, H) double m; mean of the corners
+    solid: Array                # (H,) int 1; collider whose hull it is, -1: none
+    local: Array                # (3, Q) double m; corners of colliders in their own frame
     reach: Array                # (H,) double m; radius of the sphere about the centre that holds the hull, rounding included
     rounding: Array             # (H,) double m
     graph: Array                # (H,) int 1; first row of the hull's corners in `neighbours`, -1: corners are scanned
@@ -204,14 +226,25 @@ class Meetings(NamedTuple):
     gap: Array                  # (T,) double m; normal . (first point - second point) - roundings; negative: penetration
 
 
+class Meet(NamedTuple):
+    """How hulls meet."""
+
+    still: Array                # (H,) int 1; 1: nothing moves the hull
+    pairs: Pairs
+    meetings: Meetings
+    margin: float               # double m; how near two hulls are a contact
+
+
 class Friction(NamedTuple):
     particle: Array             # (2, n) real 1; static and dynamic
     solid: Array                # (2, K) double 1
+    hull: Array                 # (2, H) double 1
 
 
 class Restitution(NamedTuple):
     particle: Array             # (n,) real 1
     solid: Array                # (K,) double 1
+    hull: Array                 # (H,) double 1
     rebound: Array              # (L,) double m; displacement along the normal after the impact, 0 where there is none
 
 
@@ -225,7 +258,10 @@ class Effects(NamedTuple):
     carried: Carried | None
     moving: Moving | None
     contact: Contacts | None
+    hulls: Hulls | None
+    meet: Meet | None
     rigid: Rigid | None
+    touches: Touches | None
     friction: Friction | None
     restitution: Restitution | None
 

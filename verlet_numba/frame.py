@@ -13,8 +13,9 @@ from verlet_numba.effects.drag import resist
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.motion import carry, move
-from verlet_numba.effects.response import gather, rebound, rub_bodies, shove
+from verlet_numba.effects.response import aim_colliders, displace, kick_back, link, rebound, respond, shove
 from verlet_numba.effects.restitution import bounce, foresee
+from verlet_numba.effects.touch import begin_touches, touch_colliders, weigh
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
 from verlet_numba.kernels.observe import keep, observe, record, record_velocity
@@ -33,7 +34,7 @@ def advance(world, frames, budget):
     """
     particles, runs, runs_softness, sticks, sticks_softness, angles, effects, solver, observed, snapshot, clock = world
     position, previous, inverse_mass, acceleration = particles
-    gravity, wind, drag, damping, carried, moving, contact, rigid, friction, restitution = effects
+    gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, friction, restitution = effects
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -54,20 +55,26 @@ def advance(world, frames, budget):
                 clock[STAGE] = INTEGRATED
             if not find_contacts(position, previous, inverse_mass, contact):
                 return FULL
-            gather(position, inverse_mass, contact, rigid)
             foresee(position, acceleration, contact, restitution, h)
+            begin_touches(rigid, touches)
+            touch_colliders(contact, friction, restitution, rigid, touches)
+            weigh(position, previous, inverse_mass, rigid)
+            link(rigid, touches)
             forget(runs_softness)
             forget(sticks_softness)
             for _ in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
-                shove(position, inverse_mass, contact, rigid)
+                aim_colliders(position, contact, rigid, touches, h)
+                respond(rigid, touches)
+                shove(friction, rigid, touches)
+                displace(position, inverse_mass, rigid)
                 snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
                 snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
                 snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
             bounce(position, previous, contact, restitution)
-            rebound(position, previous, inverse_mass, contact, restitution, rigid)
+            rebound(friction, rigid, touches)
+            kick_back(position, previous, inverse_mass, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word
-            rub_bodies(position, inverse_mass, contact, friction, rigid)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE

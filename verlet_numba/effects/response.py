@@ -1,221 +1,329 @@
 """Rigid bodies answer to contacts as a whole, without orientation matrices: everything comes from their particles.
 
-Moving only the particles that touch cannot do it: relaxation gives most of the push back, and a body neither rests nor
-bounces nor sticks as its mass would. So the contacts of a body in a substep are solved on one twist (translation and
-rotation) of all its particles, by projected Gauss-Seidel, and relaxation then has little left to do. Pushes are kept
-as displacements of the touching particle alone, impulse over its mass: the same quantity that friction weighs.
+Moving only the particles that touch cannot hold a heap: relaxation gives most of the push back, and a body neither rests
+nor bounces nor sticks as its mass would. So the touches of an island are solved on one twist (translation and rotation)
+of each entity, by projected Gauss-Seidel with Coulomb's cone, and relaxation then has little left to do. A touch pushes
+by an impulse [kg m]: force times the step squared; its slide is the displacement of the first against the second entity
+since the start of the substep.
 """
 
 import math
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.effects.contact import risen
-from verlet_numba.effects.friction import coefficients, slide_of
-from verlet_numba.effects.restitution import approach
+from verlet_numba.effects.contact import pose_of
+from verlet_numba.effects.touch import COLLIDERS
+from verlet_numba.kernels.islands import sort_islands
 from verlet_numba.physics.friction import held
-from verlet_numba.physics.pose import turn
-from verlet_numba.physics.rigid import cross, inverse_symmetric, lever
+from verlet_numba.physics.pose import inward, outward, turn
+from verlet_numba.physics.rigid import cross, response, times_symmetric
 
-SWEEPS = 16             # of projected Gauss-Seidel, at most
-SETTLED = 1e-7          # of the largest impulse: a sweep that changes less is the last
-NOTHING = -1e300        # a wish that no impulse is needed for
+SWEEPS = 16                 # over an island, at most
+FEW_SWEEPS = 4              # over an island of more touches than
+FEW_TOUCHES = 128           # these: what they leave, the next substep takes up
+SETTLED = 1e-7              # of the largest impulse: a sweep that changes less is the last
+RECOVERY = 2.5              # 1/s: an overlap that stood before leaves at this many sizes of the smaller body a second
 
 
 @kernel
-def gather(position, inverse_mass, contact, rigid):
-    """Link the contacts of each rigid body, and find mass, centre and inertia of those that are touched."""
-    if rigid is None:
+def aim_colliders(position, contact, rigid, touches, h):
+    """Lines and wishes of the touches with colliders."""
+    if contact is None or rigid is None:
         return
-    head, order, after, particle, body = rigid.head, rigid.order, contact.after, contact.particle, contact.body
-    for t in range(rigid.touched[0]):
-        head[order[t]] = -1
-    touched = 0
-    for c in range(contact.listed[0]):
-        b = body[particle[c]]
-        if b >= 0:
-            if head[b] < 0:
-                weigh(position, inverse_mass, rigid, b)
-                order[touched] = b
-                touched += 1
-            after[c] = head[b]
-            head[b] = c
-    rigid.touched[0] = touched
-
-
-@kernel
-def weigh(position, inverse_mass, rigid, b):
-    """Inverse mass, centre of mass and inverse inertia of body b, from its particles where they are."""
     x, y, z = position[0], position[1], position[2]
-    first, stride = rigid.first[b], rigid.stride[b]
-    last = first + rigid.size[b] * stride
-    mass = cx = cy = cz = 0.0
-    for k in range(first, last, stride):
-        m = 1.0 / inverse_mass[k]
-        mass, cx, cy, cz = mass + m, cx + m * x[k], cy + m * y[k], cz + m * z[k]
-    cx, cy, cz = cx / mass, cy / mass, cz / mass
-    xx = yy = zz = xy = xz = yz = 0.0
-    for k in range(first, last, stride):
-        m, dx, dy, dz = 1.0 / inverse_mass[k], x[k] - cx, y[k] - cy, z[k] - cz
-        xx, yy, zz = xx + m * (dy * dy + dz * dz), yy + m * (dx * dx + dz * dz), zz + m * (dx * dx + dy * dy)
-        xy, xz, yz = xy - m * dx * dy, xz - m * dx * dz, yz - m * dy * dz
-    rigid.inverse_mass[b] = 1.0 / mass
-    rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b] = cx, cy, cz
-    inverse = inverse_symmetric(xx, yy, zz, xy, xz, yz)
-    for e in range(6):
-        rigid.inverse_inertia[e, b] = inverse[e]
+    particle, normal, bound, anchor = contact.particle, contact.normal, contact.bound, contact.anchor
+    first, source, mass, reach, line, answer = touches.first, touches.source, rigid.mass, rigid.reach, touches.line, touches.answer
+    for t in range(touches.until[COLLIDERS]):
+        c, e = source[t], first[t]
+        k = particle[c]
+        nx, ny, nz = normal[0, c], normal[1, c], normal[2, c]
+        sx, sy, sz = x[k] - anchor[0, c], y[k] - anchor[1, c], z[k] - anchor[2, c]
+        line[t, 0], line[t, 1], line[t, 2] = nx, ny, nz
+        line[t, 3], line[t, 4], line[t, 5] = x[k] - mass[e, 1], y[k] - mass[e, 2], z[k] - mass[e, 3]
+        line[t, 6] = line[t, 7] = line[t, 8] = 0.0
+        line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
+        gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
+        slack = math.inf if answer[t, 4] > 0.0 else RECOVERY * reach[e] * h
+        answer[t, 0] = wish(gap, nx * sx + ny * sy + nz * sz, slack)
 
 
 @inlined
-def inertia_of(inertia, b):
-    """The inverse inertia of body b."""
-    return inertia[0, b], inertia[1, b], inertia[2, b], inertia[3, b], inertia[4, b], inertia[5, b]
+def wish(gap, approach, slack):
+    """How far a gap has to open [m]: all that this substep has closed, and of an overlap that stood before it only so much."""
+    standing = max(0.0, approach - gap)
+    return -gap - max(0.0, standing - slack)
 
 
 @kernel
-def twist(position, inverse_mass, contact, rigid, b, wanted, given):
-    """The twist that brings every contact of body b up by `wanted` (L,) [m], with what was `given` (L,) accumulated.
-
-    given: displacement of the particle by the impulses so far [m], never below 0. Returns translation and rotation.
-    """
-    x, y, z = position[0], position[1], position[2]
-    particle, normal, after = contact.particle, contact.normal, contact.after
-    cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
-    w, inertia, head = rigid.inverse_mass[b], inertia_of(rigid.inverse_inertia, b), rigid.head[b]
-    px = py = pz = ox = oy = oz = 0.0
-    for _ in range(SWEEPS):
-        c, change, largest = head, 0.0, 0.0
-        while c >= 0:
-            k, nx, ny, nz = particle[c], normal[0, c], normal[1, c], normal[2, c]
-            tx, ty, tz, ix, iy, iz, answer = lever(x[k] - cx, y[k] - cy, z[k] - cz, nx, ny, nz, w, inertia)
-            rise = nx * px + ny * py + nz * pz + tx * ox + ty * oy + tz * oz
-            before = given[c] / inverse_mass[k]
-            total = max(0.0, before + (wanted[c] - rise) / answer)
-            impulse, given[c] = total - before, total * inverse_mass[k]
-            px, py, pz = px + impulse * w * nx, py + impulse * w * ny, pz + impulse * w * nz
-            ox, oy, oz = ox + impulse * ix, oy + impulse * iy, oz + impulse * iz
-            change, largest = max(change, abs(impulse)), max(largest, total)
-            c = after[c]
-        if change <= SETTLED * largest:
-            break
-    return px, py, pz, ox, oy, oz
-
-
-@kernel
-def displace(position, rigid, b, moved):
-    """Move all particles of body b by a twist, turning it about its centre exactly."""
-    x, y, z = position[0], position[1], position[2]
-    px, py, pz, ox, oy, oz = moved
-    if px == py == pz == ox == oy == oz == 0.0:
+def aim_hulls(meet, hulls, contact, rigid, touches, which, h):
+    """Lines and wishes of the touches between hulls, from the corners where they are."""
+    if meet is None or rigid is None:
         return
-    cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
-    first, stride = rigid.first[b], rigid.stride[b]
-    ax, ay, az = turn(1.0, 0.0, 0.0, ox, oy, oz, 1.0)
-    bx, by, bz = turn(0.0, 1.0, 0.0, ox, oy, oz, 1.0)
-    ex, ey, ez = turn(0.0, 0.0, 1.0, ox, oy, oz, 1.0)
-    for k in range(first, first + rigid.size[b] * stride, stride):
-        rx, ry, rz = x[k] - cx, y[k] - cy, z[k] - cz
-        x[k] = cx + px + (ax * rx + bx * ry + ex * rz)
-        y[k] = cy + py + (ay * rx + by * ry + ey * rz)
-        z[k] = cz + pz + (az * rx + bz * ry + ez * rz)
-    rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b] = cx + px, cy + py, cz + pz
+    corner, weight, normal = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal
+    one, pair, rounding = meet.pairs.first, meet.meetings.pair, hulls.rounding
+    other, body, particle, start = meet.pairs.second, hulls.body, hulls.particle, hulls.start
+    x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]
+    first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
+    mass, step, moved, reach = rigid.mass, rigid.step, rigid.moved, rigid.reach
+    world = reach.size - 1
+    for t in range(touches.until[which - 1], touches.until[which]):
+        m, a, b = source[t], first[t], second[t]
+        g, q = one[pair[m]], other[pair[m]]
+        px, py, pz = point_of(x, y, z, corner, weight, m, 0)
+        qx, qy, qz = point_of(x, y, z, corner, weight, m, 3)
+        nx, ny, nz = normal[0, m], normal[1, m], normal[2, m]
+        gap = nx * (px - qx) + ny * (py - qy) + nz * (pz - qz) - rounding[g] - rounding[q]
+        if body[g] < 0 and particle[start[g]] < 0:      # the collider was the first hull
+            px, py, pz, qx, qy, qz, nx, ny, nz, q = qx, qy, qz, px, py, pz, -nx, -ny, -nz, g
+        px, py, pz = px - mass[a, 1], py - mass[a, 2], pz - mass[a, 3]
+        sx, sy, sz = shift_of(step, moved, a, px, py, pz)
+        if b == world:
+            tx, ty, tz = carried_by(contact, hulls.solid[q], qx, qy, qz)
+            size = reach[a]
+            qx = qy = qz = 0.0
+        else:
+            qx, qy, qz = qx - mass[b, 1], qy - mass[b, 2], qz - mass[b, 3]
+            tx, ty, tz = shift_of(step, moved, b, qx, qy, qz)
+            size = min(reach[a], reach[b]) if min(reach[a], reach[b]) > 0.0 else max(reach[a], reach[b])
+        sx, sy, sz = sx - tx, sy - ty, sz - tz
+        line[t, 0], line[t, 1], line[t, 2] = nx, ny, nz
+        line[t, 3], line[t, 4], line[t, 5] = px, py, pz
+        line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
+        line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
+        answer[t, 0] = wish(gap, nx * sx + ny * sy + nz * sz, RECOVERY * size * h)
+
+
+@inlined
+def point_of(x, y, z, corner, weight, m, side):
+    """The point of meeting m on the first (side 0) or second (3) hull."""
+    i, j, k = corner[side, m], corner[side + 1, m], corner[side + 2, m]
+    a, b, c = weight[side, m], weight[side + 1, m], weight[side + 2, m]
+    return a * x[i] + b * x[j] + c * x[k], a * y[i] + b * y[j] + c * y[k], a * z[i] + b * z[j] + c * z[k]
+
+
+@inlined
+def shift_of(step, moved, e, rx, ry, rz):
+    """Displacement of entity e at the arm r since the start of the substep."""
+    ox, oy, oz = step[e, 3] + moved[e, 3], step[e, 4] + moved[e, 4], step[e, 5] + moved[e, 5]
+    return (step[e, 0] + moved[e, 0] + (oy * rz - oz * ry), step[e, 1] + moved[e, 1] + (oz * rx - ox * rz),
+            step[e, 2] + moved[e, 2] + (ox * ry - oy * rx))
 
 
 @kernel
-def shove(position, inverse_mass, contact, rigid):
-    """Move every touched body out of its colliders as a whole."""
+def respond(rigid, touches):
+    """How far the two entities of every touch give way to a unit impulse along its line."""
+    if rigid is None:
+        return
+    first, second, line, answer, mass = touches.first, touches.second, touches.line, touches.answer, rigid.mass
+    for t in range(touches.until[-1]):
+        given = along(mass, first[t], line[t, 3], line[t, 4], line[t, 5], line[t, 0], line[t, 1], line[t, 2])
+        given += along(mass, second[t], line[t, 6], line[t, 7], line[t, 8], line[t, 0], line[t, 1], line[t, 2])
+        answer[t, 1] = 1.0 / given if given > 0.0 else 0.0
+
+
+@inlined
+def along(mass, e, rx, ry, rz, nx, ny, nz):
+    """The response of entity e at the arm r along the unit vector n."""
+    return response(rx, ry, rz, nx, ny, nz, mass[e, 0], mass[e, 4], mass[e, 5], mass[e, 6], mass[e, 7], mass[e, 8], mass[e, 9])
+
+
+@inlined
+def relative(twist, a, b, line, t):
+    """Displacement of entity a against b at the arms of touch t by their twists."""
+    ax, ay, az, bx, by, bz = line[t, 3], line[t, 4], line[t, 5], line[t, 6], line[t, 7], line[t, 8]
+    return ((twist[a, 0] + twist[a, 4] * az - twist[a, 5] * ay) - (twist[b, 0] + twist[b, 4] * bz - twist[b, 5] * by),
+            (twist[a, 1] + twist[a, 5] * ax - twist[a, 3] * az) - (twist[b, 1] + twist[b, 5] * bx - twist[b, 3] * bz),
+            (twist[a, 2] + twist[a, 3] * ay - twist[a, 4] * ax) - (twist[b, 2] + twist[b, 3] * by - twist[b, 4] * bx))
+
+
+@inlined
+def strike(twist, mass, e, rx, ry, rz, jx, jy, jz):
+    """Give entity e the impulse j at the arm r."""
+    w = mass[e, 0]
+    twist[e, 0] += w * jx
+    twist[e, 1] += w * jy
+    twist[e, 2] += w * jz
+    tx, ty, tz = cross(rx, ry, rz, jx, jy, jz)
+    ox, oy, oz = times_symmetric(mass[e, 4], mass[e, 5], mass[e, 6], mass[e, 7], mass[e, 8], mass[e, 9], tx, ty, tz)
+    twist[e, 3] += ox
+    twist[e, 4] += oy
+    twist[e, 5] += oz
+
+
+@inlined
+def strike_both(twist, mass, a, b, line, t, jx, jy, jz):
+    """Give the impulse j of touch t to its first entity, and -j to the second."""
+    strike(twist, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
+    strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
+
+
+@kernel
+def link(rigid, touches):
+    """Sort the touches by island; nothing has been given yet."""
+    if rigid is None:
+        return
+    touches.islands[0] = sort_islands(touches.first, touches.second, touches.until[-1], rigid.size.size - 1, rigid.parent,
+                                      touches.label, touches.order, touches.island)
+    touches.given[:touches.until[-1]] = 0.0
+
+
+@kernel
+def carried_by(contact, solid, x, y, z):
+    """Displacement [m] of the point of a collider that is at (x, y, z) now, in this substep."""
+    if contact is None:
+        return 0.0, 0.0, 0.0
+    solids = contact.solids
+    origin, rotation, earlier, turned = solids.origin, solids.rotation, solids.origin_before, solids.rotation_before
+    px, py, pz = inward(x, y, z, pose_of(origin, rotation, solid))
+    pose = pose_of(earlier, turned, solid)
+    px, py, pz = outward(px, py, pz, pose)
+    return x - (px + pose[0]), y - (py + pose[1]), z - (pz + pose[2])
+
+
+@kernel
+def sweeps_of(touches):
+    """Sweeps over an island of so many touches."""
+    return SWEEPS if touches <= FEW_TOUCHES else FEW_SWEEPS
+
+
+@kernel
+def shove(friction, rigid, touches):
+    """Solve the touches of every island: gaps are opened as wished, slides are taken back within the cone of friction."""
+    if rigid is None:
+        return
+    first, second, order, island = touches.first, touches.second, touches.order, touches.island
+    line, answer, given, twist, mass = touches.line, touches.answer, touches.given, rigid.twist, rigid.mass
+    for i in range(rigid.touched[0]):
+        twist[rigid.order[i]] = 0.0
+    for i in range(touches.islands[0]):
+        begin, end = island[i], island[i + 1]
+        for _ in range(sweeps_of(end - begin)):
+            change = largest = 0.0
+            for o in range(begin, end):
+                t = order[o]
+                a, b = first[t], second[t]
+                nx, ny, nz = line[t, 0], line[t, 1], line[t, 2]
+                ux, uy, uz = relative(twist, a, b, line, t)
+                push = max(0.0, given[t, 0] + (answer[t, 0] - (nx * ux + ny * uy + nz * uz)) * answer[t, 1])
+                j = push - given[t, 0]
+                given[t, 0] = push
+                if j != 0.0:
+                    strike_both(twist, mass, a, b, line, t, j * nx, j * ny, j * nz)
+                j = max(abs(j), grip(friction, twist, mass, a, b, line, answer, given, t, push))
+                change, largest = max(change, j), max(largest, push)
+            if change <= SETTLED * largest:
+                break
+
+
+@kernel
+def grip(friction, twist, mass, a, b, line, answer, given, t, push):
+    """Take back the slide of touch t as far as friction holds. Returns the length of the impulse given."""
+    if friction is None:
+        return 0.0
+    gx, gy, gz = given[t, 1], given[t, 2], given[t, 3]
+    if push == 0.0 and gx == gy == gz == 0.0:
+        return 0.0
+    nx, ny, nz = line[t, 0], line[t, 1], line[t, 2]
+    ux, uy, uz = relative(twist, a, b, line, t)
+    sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
+    rise = nx * sx + ny * sy + nz * sz
+    sx, sy, sz = sx - rise * nx, sy - rise * ny, sz - rise * nz
+    slide = math.sqrt(sx * sx + sy * sy + sz * sz)
+    wx, wy, wz = gx, gy, gz
+    if slide > 0.0:
+        sx, sy, sz = sx / slide, sy / slide, sz / slide
+        yields = along(mass, a, line[t, 3], line[t, 4], line[t, 5], sx, sy, sz)
+        yields += along(mass, b, line[t, 6], line[t, 7], line[t, 8], sx, sy, sz)
+        back = slide / yields
+        wx, wy, wz = gx - back * sx, gy - back * sy, gz - back * sz
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    share = held(length, push, answer[t, 2], answer[t, 3]) if length > 0.0 else 1.0
+    given[t, 1], given[t, 2], given[t, 3] = share * wx, share * wy, share * wz
+    jx, jy, jz = share * wx - gx, share * wy - gy, share * wz - gz
+    strike_both(twist, mass, a, b, line, t, jx, jy, jz)
+    return math.sqrt(jx * jx + jy * jy + jz * jz)
+
+
+@kernel
+def displace(position, inverse_mass, rigid):
+    """Move the particles of every touched entity by its twist, turning it about its centre exactly."""
     if rigid is None:
         return
     x, y, z = position[0], position[1], position[2]
-    particle, normal, bound, after, wanted = contact.particle, contact.normal, contact.bound, contact.after, rigid.wanted
-    for t in range(rigid.touched[0]):
-        b = rigid.order[t]
-        c = rigid.head[b]
-        while c >= 0:
-            k = particle[c]
-            wanted[c] = bound[c] - risen(normal, c, x[k], y[k], z[k])
-            c = after[c]
-        displace(position, rigid, b, twist(position, inverse_mass, contact, rigid, b, wanted, contact.push))
-
-
-@kernel
-def rebound(position, previous, inverse_mass, contact, restitution, rigid):
-    """Give touched bodies the velocity, as a whole, with which their impacts leave; by moving previous positions."""
-    if restitution is None or rigid is None:
-        return
-    x, y, z = position[0], position[1], position[2]
-    particle, normal, anchor, after, push = contact.particle, contact.normal, contact.anchor, contact.after, contact.push
-    leaves, wanted, given = restitution.rebound, rigid.wanted, rigid.given
-    for t in range(rigid.touched[0]):
-        b = rigid.order[t]
-        c, hits = rigid.head[b], 0
-        while c >= 0:
-            k, given[c], wanted[c] = particle[c], 0.0, NOTHING
-            if leaves[c] > 0.0 and push[c] > 0.0:
-                wanted[c] = leaves[c] - approach(normal, anchor, c, x[k], y[k], z[k])
-                hits += 1
-            c = after[c]
-        if hits == 0:
+    first, stride, size, order = rigid.first, rigid.stride, rigid.size, rigid.order
+    twist, moved, mass = rigid.twist, rigid.moved, rigid.mass
+    for i in range(rigid.touched[0]):
+        e = order[i]
+        px, py, pz, ox, oy, oz = twist[e, 0], twist[e, 1], twist[e, 2], twist[e, 3], twist[e, 4], twist[e, 5]
+        if px == py == pz == ox == oy == oz == 0.0:
             continue
-        kick_back(position, previous, rigid, b, twist(position, inverse_mass, contact, rigid, b, wanted, given))
-        c = rigid.head[b]
-        while c >= 0:
-            push[c] += given[c]
-            c = after[c]
+        cx, cy, cz = mass[e, 1], mass[e, 2], mass[e, 3]
+        ax, ay, az = turn(1.0, 0.0, 0.0, ox, oy, oz, 1.0)
+        bx, by, bz = turn(0.0, 1.0, 0.0, ox, oy, oz, 1.0)
+        ex, ey, ez = turn(0.0, 0.0, 1.0, ox, oy, oz, 1.0)
+        for k in range(first[e], first[e] + size[e] * stride[e], stride[e]):
+            if inverse_mass[k] > 0:
+                rx, ry, rz = x[k] - cx, y[k] - cy, z[k] - cz
+                x[k] = cx + px + (ax * rx + bx * ry + ex * rz)
+                y[k] = cy + py + (ay * rx + by * ry + ey * rz)
+                z[k] = cz + pz + (az * rx + bz * ry + ez * rz)
+        mass[e, 1], mass[e, 2], mass[e, 3] = cx + px, cy + py, cz + pz
+        for column in range(6):
+            moved[e, column] += twist[e, column]
 
 
 @kernel
-def kick_back(position, previous, rigid, b, moved):
-    """Move the previous positions of body b against a twist: the body gains it as displacement of the step."""
-    x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
-    px, py, pz, ox, oy, oz = moved
-    cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
-    first, stride = rigid.first[b], rigid.stride[b]
-    for k in range(first, first + rigid.size[b] * stride, stride):
-        dx, dy, dz = cross(ox, oy, oz, x[k] - cx, y[k] - cy, z[k] - cz)
-        u[k], v[k], w[k] = u[k] - (px + dx), v[k] - (py + dy), w[k] - (pz + dz)
+def rebound(friction, rigid, touches):
+    """Velocities after the passes: an impact leaves as it should, what was pushed out of an overlap does not fly off.
 
-
-@kernel
-def rub_bodies(position, inverse_mass, contact, friction, rigid):
-    """Take back the sliding of touched bodies as a whole, after the last pass: what sticks stands where it stood."""
-    if friction is None or rigid is None:
+    Impulses that change the velocity alone. They open a gap where a rebound is due, with friction for that push too; and
+    where two separate only because they were pushed apart, they take that speed away, never more than the push gave.
+    """
+    if rigid is None:
         return
-    for t in range(rigid.touched[0]):
-        b = rigid.order[t]
-        displace(position, rigid, b, hold(position, inverse_mass, contact, friction, rigid, b))
+    first, second, order, island = touches.first, touches.second, touches.order, touches.island
+    line, answer, given, kick, mass = touches.line, touches.answer, touches.given, rigid.kick, rigid.mass
+    for t in range(touches.until[-1]):                  # the last pass has moved them since they were aimed
+        ux, uy, uz = relative(rigid.twist, first[t], second[t], line, t)
+        line[t, 9], line[t, 10], line[t, 11] = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
+    for i in range(touches.islands[0]):
+        begin, end = island[i], island[i + 1]
+        for _ in range(sweeps_of(end - begin)):
+            change = largest = 0.0
+            for o in range(begin, end):
+                t = order[o]
+                if given[t, 0] == 0.0:
+                    continue
+                a, b = first[t], second[t]
+                nx, ny, nz = line[t, 0], line[t, 1], line[t, 2]
+                ux, uy, uz = relative(kick, a, b, line, t)
+                sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
+                leaving = nx * sx + ny * sy + nz * sz
+                most = math.inf if answer[t, 4] > 0.0 else 0.0
+                total = min(most, max(-given[t, 0], given[t, 4] + (answer[t, 4] - leaving) * answer[t, 1]))
+                j = total - given[t, 4]
+                given[t, 4] = total
+                if j != 0.0:
+                    strike_both(kick, mass, a, b, line, t, j * nx, j * ny, j * nz)
+                if total > 0.0:
+                    grip(friction, kick, mass, a, b, line, answer, given, t, given[t, 0] + total)
+                change, largest = max(change, abs(j)), max(largest, given[t, 0])
+            if change <= SETTLED * largest:
+                break
 
 
 @kernel
-def hold(position, inverse_mass, contact, friction, rigid, b):
-    """The twist that takes back the sliding at the contacts of body b, each within Coulomb's share of its push."""
-    x, y, z = position[0], position[1], position[2]
-    particle, solid, push, after = contact.particle, contact.solid, contact.push, contact.after
-    normal, anchor, grip, own, other = contact.normal, contact.anchor, rigid.grip, friction.particle, friction.solid
-    cx, cy, cz = rigid.centre[0, b], rigid.centre[1, b], rigid.centre[2, b]
-    w, inertia, head = rigid.inverse_mass[b], inertia_of(rigid.inverse_inertia, b), rigid.head[b]
-    px = py = pz = ox = oy = oz = 0.0
-    for sweep in range(SWEEPS):
-        c, change, largest = head, 0.0, 0.0
-        while c >= 0:
-            if sweep == 0:
-                grip[0, c] = grip[1, c] = grip[2, c] = 0.0
-            k = particle[c]
-            rx, ry, rz = x[k] - cx, y[k] - cy, z[k] - cz
-            tx, ty, tz = cross(ox, oy, oz, rx, ry, rz)
-            sx, sy, sz, slide = slide_of(normal, anchor, c, x[k] + px + tx, y[k] + py + ty, z[k] + pz + tz)
-            if push[c] > 0.0 and slide > 0.0:
-                answer = lever(rx, ry, rz, sx / slide, sy / slide, sz / slide, w, inertia)[6]
-                gx, gy, gz = grip[0, c] - sx / answer, grip[1, c] - sy / answer, grip[2, c] - sz / answer
-                static, dynamic = coefficients(own, other, k, solid[c])
-                length = math.sqrt(gx * gx + gy * gy + gz * gz)
-                share = held(length * inverse_mass[k], push[c], static, dynamic) if length > 0.0 else 1.0
-                jx, jy, jz = gx * share - grip[0, c], gy * share - grip[1, c], gz * share - grip[2, c]
-                grip[0, c], grip[1, c], grip[2, c] = gx * share, gy * share, gz * share
-                change, largest = max(change, abs(jx), abs(jy), abs(jz)), max(largest, length * share)
-                px, py, pz = px + jx * w, py + jy * w, pz + jz * w
-                _, _, _, ix, iy, iz, _ = lever(rx, ry, rz, jx, jy, jz, w, inertia)
-                ox, oy, oz = ox + ix, oy + iy, oz + iz
-            c = after[c]
-        if change <= SETTLED * largest:
-            break
-    return px, py, pz, ox, oy, oz
+def kick_back(position, previous, inverse_mass, rigid):
+    """Move the previous positions of entities against what their velocity was given."""
+    if rigid is None:
+        return
+    x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
+    first, stride, size, order, kick, mass = rigid.first, rigid.stride, rigid.size, rigid.order, rigid.kick, rigid.mass
+    for i in range(rigid.touched[0]):
+        e = order[i]
+        px, py, pz, ox, oy, oz = kick[e, 0], kick[e, 1], kick[e, 2], kick[e, 3], kick[e, 4], kick[e, 5]
+        if px == py == pz == ox == oy == oz == 0.0:
+            continue
+        for k in range(first[e], first[e] + size[e] * stride[e], stride[e]):
+            if inverse_mass[k] > 0:
+                dx, dy, dz = cross(ox, oy, oz, x[k] - mass[e, 1], y[k] - mass[e, 2], z[k] - mass[e, 3])
+                u[k], v[k], w[k] = u[k] - (px + dx), v[k] - (py + dy), w[k] - (pz + dz)

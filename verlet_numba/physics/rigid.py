@@ -33,8 +33,17 @@ def times_symmetric(xx, yy, zz, xy, xz, yz, x, y, z):
 
 
 @formula
-def lever(rx, ry, rz, nx, ny, nz, inverse_mass, inverse_inertia):
-    """How a body answers at the arm r along the unit vector n: r x n, I^-1 (r x n), and the displacement of a unit impulse."""
+def about_axis(xx, yy, zz, xy, xz, yz, ax, ay, az):
+    """Inverse inertia of a body that can only turn about the unit vector a: a a^T / (a . I a); a = 0: not at all."""
+    ix, iy, iz = times_symmetric(xx, yy, zz, xy, xz, yz, ax, ay, az)
+    about = ax * ix + ay * iy + az * iz
+    s = 1.0 / about if about > 0.0 else 0.0
+    return ax * ax * s, ay * ay * s, az * az * s, ax * ay * s, ax * az * s, ay * az * s
+
+
+@formula
+def response(rx, ry, rz, nx, ny, nz, inverse_mass, xx, yy, zz, xy, xz, yz):
+    """Displacement along the unit vector n at the arm r of a unit impulse there."""
     tx, ty, tz = cross(rx, ry, rz, nx, ny, nz)
-    ix, iy, iz = times_symmetric(*inverse_inertia, tx, ty, tz)
-    return tx, ty, tz, ix, iy, iz, inverse_mass + tx * ix + ty * iy + tz * iz
+    ix, iy, iz = times_symmetric(xx, yy, zz, xy, xz, yz, tx, ty, tz)
+    return inverse_mass + tx * ix + ty * iy + tz * iz

@@ -15,6 +15,7 @@ from verlet_numba.frame import FULL, OK, PAUSED, advance
 from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
 from verlet_numba.scene.colliders import room
+from verlet_numba.scene.rigid import touches_of
 
 BUDGET = 64                 # substeps between two looks at signals, at first
 PAUSE_SECONDS = 0.1         # the budget doubles while it is done sooner
@@ -74,15 +75,15 @@ def grown(world: World) -> World:
     effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
     assert contact is not None
     capacity = 2 * contact.particle.size
-    particle, solid, normal, bound, anchor, push, after = room(capacity)
-    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push, after=after)
+    particle, solid, normal, bound, anchor, push = room(capacity)
+    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
     if restitution is not None:
         restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
-    rigid = effects.rigid
-    if rigid is not None:
-        wanted, given, grip = (gate(np.zeros(shape), np.float64) for shape in (capacity, capacity, (3, capacity)))
-        rigid = rigid._replace(wanted=wanted, given=given, grip=grip)
-    return world._replace(effects=effects._replace(contact=contact, restitution=restitution, rigid=rigid))
+    touches = effects.touches
+    if touches is not None:
+        assert effects.rigid is not None
+        touches = touches_of(capacity, len(effects.rigid.size))
+    return world._replace(effects=effects._replace(contact=contact, restitution=restitution, touches=touches))
 
 
 def run_chunk(model: Model, chunk: Frames, stop: Callable[[], object] = bool) -> int:

@@ -20,9 +20,10 @@ from verlet_numba.buffers import (
 )
 from verlet_numba.scene import forces
 from verlet_numba.scene.body import Body, Floats, Integers
-from verlet_numba.scene.colliders import carried, contact_of, spread
+from verlet_numba.scene.colliders import carried
 from verlet_numba.scene.constraints import constraints
-from verlet_numba.scene.numbering import Numbering, number, padded
+from verlet_numba.scene.meeting import contact_of
+from verlet_numba.scene.numbering import Numbering, number, padded, spread
 from verlet_numba.scene.schema import Scene
 
 

@@ -12,16 +12,13 @@ from verlet_numba.buffers import (
     Array,
     Carried,
     Contacts,
-    Friction,
     Moving,
     Paths,
-    Restitution,
-    Rigid,
     Solids,
     gate,
 )
 from verlet_numba.scene.body import Body, Floats, Integers
-from verlet_numba.scene.numbering import Numbering
+from verlet_numba.scene.numbering import Numbering, spread
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_colliders import BaseCollider
 
@@ -122,26 +119,13 @@ def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
                    gate(np.zeros((3, len(points))), np.float64), paths(points))
 
 
-class Contact(NamedTuple):
-    moving: Moving | None
-    contact: Contacts | None
-    rigid: Rigid | None
-    friction: Friction | None
-    restitution: Restitution | None
-
-
-def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Contact:
-    """Contact with colliders and the materials that meet; all None without colliders, particles or the wish."""
-    if not scene.colliders or scene.effects.contact == "none" or not (inverse_mass > 0).any():
-        return Contact(None, None, None, None, None)
-    found, arrays = solids_of(scene)
-    size = len(inverse_mass)
+def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, belongs: Integers, real: Any) -> Contacts | None:
+    """Contact of particles with colliders; `belongs` (n,): the rigid body that answers for a particle, or -1."""
+    if not scene.colliders:
+        return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
-    rigid, body = rigid_of(bodies, numbering, size)
-    contact = Contacts(arrays, gate(radius, real), gate(body, np.int64), margin(bodies), gate(np.zeros(1), np.int64),
-                       *room(FIRST_ROOM))
-    return Contact(moving(found), contact, rigid, friction_of(scene, found, bodies, numbering, size, real),
-                   restitution_of(scene, found, bodies, numbering, size, real))
+    return Contacts(solids_of(scene)[1], gate(radius, real), gate(belongs, np.int64), margin(bodies),
+                    gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
 
 
 def margin(bodies: list[Body]) -> float:
@@ -151,58 +135,6 @@ def margin(bodies: list[Body]) -> float:
 
 
 def room(capacity: int) -> tuple[Array, ...]:
-    """Empty contact buffers: particle, solid, normal, bound, anchor, push, after."""
+    """Empty contact buffers: particle, solid, normal, bound, anchor, push."""
     return (gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros((3, capacity)), np.float64),
-            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64),
-            gate(np.zeros(capacity), np.int64))
-
-
-def rigid_of(bodies: list[Body], numbering: Numbering, size: int) -> tuple[Rigid | None, Integers]:
-    """Rigid bodies without pins, and which of them each particle (n,) belongs to."""
-    whole = [(body, index) for body, index in zip(bodies, numbering.bodies, strict=True)
-             if body.shape.rigid and not body.pinned.any()]
-    belongs = np.full(size, -1, np.int64)
-    if not whole:
-        return None, belongs
-    first = np.concatenate([index[:, 0] for _, index in whole])
-    stride = np.concatenate([index[:, 1] - index[:, 0] for _, index in whole])
-    counts = np.concatenate([np.full(len(index), index.shape[1]) for _, index in whole])
-    for b, (start, step, count) in enumerate(zip(first, stride, counts, strict=True)):
-        belongs[start:start + step * count:step] = b
-    total = len(first)
-    whole_numbers = [gate(array, np.int64) for array in (first, stride, counts, np.full(total, -1), np.zeros(total), np.zeros(1))]
-    shapes = (total, (3, total), (6, total), FIRST_ROOM, FIRST_ROOM, (3, FIRST_ROOM))
-    doubles = [gate(np.zeros(shape), np.float64) for shape in shapes]
-    return Rigid(*whole_numbers, *doubles), belongs
-
-
-def spread(numbering: Numbering, values: list[Any], size: int) -> Floats:
-    """(size,) values of every body, a number or (K, P), at the inner indices of its particles; 0 for ghosts."""
-    result = np.zeros(size)
-    for index, value in zip(numbering.bodies, values, strict=True):
-        result[index] = value
-    return result
-
-
-def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int,
-                real: Any) -> Friction | None:
-    """Coefficients of particles and surfaces; None if no two that may meet have any: they meet with sqrt(a b)."""
-    default = scene.effects.friction
-    pairs = [solid.collider.friction or default for solid in found]
-    solid = np.array([[pair.static, pair.dynamic] if pair else [0.0, 0.0] for pair in pairs]).T
-    particle = np.stack([spread(numbering, [body.friction[which] for body in bodies], size) for which in range(2)])
-    if not particle.any() or not solid.any():
-        return None
-    return Friction(gate(particle, real), gate(solid, np.float64))
-
-
-def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int,
-                   real: Any) -> Restitution | None:
-    """Coefficients of particles and surfaces; None if all are 0: two that meet take the larger."""
-    default = scene.effects.restitution or 0.0
-    given = [solid.collider.restitution for solid in found]
-    solid = np.array([default if value is None else value for value in given])
-    particle = spread(numbering, [body.restitution for body in bodies], size)
-    if not particle.any() and not solid.any():
-        return None
-    return Restitution(gate(particle, real), gate(solid, np.float64), gate(np.zeros(FIRST_ROOM), np.float64))
+            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64))

@@ -8,10 +8,11 @@ row-major order are neighbours in the cloth or one of them is a ghost.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from verlet_numba.scene.body import Body, Integers, Shape
+from verlet_numba.scene.body import Body, Floats, Integers, Shape
 
 BLOCK_SLOTS = 3072      # slots of a block: 12 particles of icosahedra x 256 lanes; 128 lanes take 12 % longer in float32
 SMALL_SLOTS = 4096      # a group up to this size is a single block
@@ -103,6 +104,14 @@ def number(bodies: list[Body]) -> Numbering:
         groups.append(group)
         first += group.size
     return Numbering(tuple(groups), tuple(indices[b] for b in range(len(bodies))), first)
+
+
+def spread(numbering: Numbering, values: list[Any], size: int) -> Floats:
+    """(size,) values of every body, a number or (K, P), at the inner indices of its particles; 0 for ghosts."""
+    result = np.zeros(size)
+    for index, value in zip(numbering.bodies, values, strict=True):
+        result[index] = value
+    return result
 
 
 def padded(size: int, itemsize: int) -> int:

@@ -149,7 +149,7 @@ def test_materials_of_nothing_do_nothing():
     case = Case().found()
     separate(case.particles.position, case.contact)
     before, previous = case.particles.position.copy(), case.particles.previous.copy()
-    nothing = Friction(np.zeros_like(case.friction.particle), case.friction.solid)
+    nothing = case.friction._replace(particle=np.zeros_like(case.friction.particle))
     rub(case.particles.position, case.contact, nothing)
     restitution = Restitution(*(np.zeros_like(array) for array in case.restitution))
     foresee(case.particles.position, case.particles.acceleration, case.contact, restitution, H)
