@@ -23,6 +23,7 @@ WHOLE, INTEGRATED = 0, 1                                # its stage: where a sub
 KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
 ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
 COLUMNS = 20
+FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 
 
 class Particles(NamedTuple):
@@ -231,8 +232,23 @@ class Meet(NamedTuple):
 
     still: Array                # (H,) int 1; 1: nothing moves the hull
     pairs: Pairs
+    spare: Pairs
+    search: Search
+    narrow: Narrow
+    manifold: Manifold | None   # None: one contact a pair
     meetings: Meetings
     margin: float               # double m; how near two hulls are a contact
+    horizon: int                # int 1; substeps that a list of pairs shall last
+    coherent: int | None        # int 1; None: nothing is remembered from the last substep
+    all_pairs: int | None       # int 1; None: pairs are found by grids
+
+
+class Features(NamedTuple):
+    """The paper's response: features of hulls are moved apart."""
+
+    point: int                  # int 1; FEATURE, BODY or PRINTED: which masses place the point where two features meet
+    mass: Array                 # (H,) double kg; of the hull's body
+    push: Array                 # (T,) double m; how far the features of a meeting have been moved apart in this substep
 
 
 class Friction(NamedTuple):
@@ -262,6 +278,7 @@ class Effects(NamedTuple):
     meet: Meet | None
     rigid: Rigid | None
     touches: Touches | None
+    features: Features | None
     friction: Friction | None
     restitution: Restitution | None
 

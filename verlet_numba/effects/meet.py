@@ -1,0 +1,78 @@
+"""Rigid bodies meet each other and colliders: candidate pairs, GJK, contact points (paper, 5.1)."""
+
+from verlet_numba._jit import kernel
+from verlet_numba.effects.contact import pose_of
+from verlet_numba.kernels.candidates import FULL, refresh
+from verlet_numba.kernels.manifold import widen
+from verlet_numba.kernels.narrow import collide, gather_hulls
+from verlet_numba.physics.pose import outward
+
+
+@kernel
+def gather(position, hulls):
+    """Bring the corners of all hulls to where their particles are."""
+    if hulls is None:
+        return
+    gather_hulls(position, hulls)
+
+
+@kernel
+def move_hulls(hulls, contact, moving):
+    """Bring the hulls of colliders that move to where those are."""
+    if hulls is None or moving is None:
+        return
+    x, y, z, local, start, solid = hulls.corner[0], hulls.corner[1], hulls.corner[2], hulls.local, hulls.start, hulls.solid
+    origin, rotation = contact.solids.origin, contact.solids.rotation
+    for h in range(solid.size):
+        if solid[h] >= 0:
+            pose = pose_of(origin, rotation, solid[h])
+            for q in range(start[h], start[h + 1]):
+                px, py, pz = outward(local[0, q], local[1, q], local[2, q], pose)
+                x[q], y[q], z[q] = px + pose[0], py + pose[1], pz + pose[2]
+
+
+@kernel
+def find_meetings(hulls, meet):
+    """List the contacts of hulls. False: more than there is room for (grow and call again)."""
+    if meet is None:
+        return True
+    horizon, margin = meet.horizon, meet.margin
+    if refresh(hulls, meet.still, meet.pairs, meet.spare, meet.search, margin, horizon, meet.all_pairs) == FULL:
+        return False
+    if not collide(hulls, meet.pairs, meet.meetings, meet.narrow, margin, meet.coherent):
+        return False
+    return several(hulls, meet.pairs, meet.meetings, meet.manifold)
+
+
+@kernel
+def several(hulls, pairs, meetings, manifold):
+    """Give each pair of hulls as many contacts as it needs, where the scene calls for that."""
+    if manifold is None:
+        return True
+    return widen(hulls, pairs, meetings, manifold)
+
+
+@kernel
+def pushing(touches, features, meet):
+    """The number of contacts of bodies that have pushed in this substep."""
+    return pushing_touches(touches) + pushing_features(features, meet)
+
+
+@kernel
+def pushing_touches(touches):
+    if touches is None:
+        return 0
+    pushed = 0
+    for t in range(touches.until[-1]):
+        pushed += touches.given[t, 0] > 0.0
+    return pushed
+
+
+@kernel
+def pushing_features(features, meet):
+    if features is None or meet is None:
+        return 0
+    pushed = 0
+    for m in range(meet.meetings.listed[0]):
+        pushed += features.push[m] > 0.0
+    return pushed
