@@ -107,9 +107,12 @@ class Constraints(NamedTuple):
 
 
 def constraints(bodies: list[Body], numbering: Numbering, attachments: Integers, inverse_mass: Floats,
-                step: float, passes: int, real: Any) -> Constraints:
-    """All constraints of a scene. attachments: (A, 2) inner indices; inverse_mass: (n,) 1/kg; step [s]."""
-    with_sticks = [group for group in numbering.groups if len(group.shape.sticks)]
+                step: float, passes: int, real: Any, rigid: bool = True) -> Constraints:
+    """All constraints of a scene. attachments: (A, 2) inner indices; inverse_mass: (n,) 1/kg; step [s].
+
+    rigid: False leaves out the sticks of rigid bodies, for relaxation in the order of the constraint graph.
+    """
+    with_sticks = [group for group in numbering.groups if len(group.shape.sticks) and (rigid or not group.shape.rigid)]
     long = [group for group in with_sticks if worth_runs(group)]
     single = [group for group in with_sticks if not worth_runs(group)]
     runs = sticks = runs_softness = sticks_softness = None
