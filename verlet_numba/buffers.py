@@ -90,6 +90,13 @@ class Graph(NamedTuple):
     packed: Array               # (3, Q) real m; room for the particles of bodies side by side
 
 
+class Collided(NamedTuple):
+    """What a collision did to the rigid bodies of a Graph."""
+
+    before: Array               # (3, n) real m; positions before the separation
+    moved: Array                # (G,) int 1; particle of the body that the separation moved farthest, -1: none
+
+
 class Gravity(NamedTuple):
     acceleration: Array         # (3, n) real m/s^2; 0 for what is pinned
 
@@ -159,6 +166,7 @@ class Contacts(NamedTuple):
     solids: Solids
     radius: Array               # (n,) real m; contact radius
     body: Array                 # (n,) int 1; rigid body that answers as a whole, -1: the particle answers alone
+    planes_only: Array          # (n,) int 1; 1: the particle's body meets all other colliders as a hull
     margin: float               # double m; how near a particle must come to be listed
     listed: Array               # (1,) int 1; how many contacts there are
     particle: Array             # (L,) int 1
@@ -271,6 +279,23 @@ class Features(NamedTuple):
     point: int                  # int 1; FEATURE, BODY or PRINTED: which masses place the point where two features meet
     mass: Array                 # (H,) double kg; of the hull's body
     push: Array                 # (T,) double m; how far the features of a meeting have been moved apart in this substep
+class Manifold(NamedTuple):
+    """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
+
+    points: Array               # (T,) int 1; contacts that each of Meetings becomes, 0: it stays as it is
+    corner: Array               # (6, T) int 1; those contacts, one after another; as in Meetings
+    weight: Array               # (6, T) double 1
+    gap: Array                  # (T,) double m
+    near: Array                 # (Q,) int 1; columns of a hull's corners near its support plane; as many as a hull has
+    spot: Array                 # (4, Q) double m; their coordinates in the plane, height over it, distance to those kept
+    column: Array               # (2, 16) int 1; corners of the two support polygons
+    polygon: Array              # (2, 2, 16) double m; and where they are in the plane
+    distance: Array             # (2, 16, 16) double m; corners of one polygon from the edges of the other
+    place: Array                # (3, 64) double m; points that both polygons share: coordinates in the plane, gap
+    point_corner: Array         # (6, 64) int 1; the same as weighted corners
+    point_weight: Array         # (6, 64) double 1
+    ring: Array                 # (64,) int 1; the order of corners or points around their mean
+    angle: Array                # (64,) double 1
 
 
 class Friction(NamedTuple):
@@ -340,6 +365,8 @@ class World(NamedTuple):
     sticks: Sticks | None
     sticks_softness: Softness | None
     angles: Angles | None
+    graph: Graph | None
+    collided: Collided | None
     effects: Effects
     solver: Solver
     observed: Observed

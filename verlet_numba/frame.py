@@ -10,17 +10,21 @@ from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, 
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
+from verlet_numba.effects.features import begin_features, part_features, rub_features
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
+from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
+from verlet_numba.effects.most_moved import choose_lists, remember
 from verlet_numba.effects.motion import carry, move
-from verlet_numba.effects.response import aim_colliders, displace, kick_back, link, rebound, respond, shove
+from verlet_numba.effects.response import aim_colliders, aim_hulls, displace, kick_back, link, rebound, respond, shove
 from verlet_numba.effects.restitution import bounce, foresee
-from verlet_numba.effects.touch import begin_touches, touch_colliders, weigh
+from verlet_numba.effects.touch import HULLS, begin_touches, touch_colliders, touch_hulls, weigh
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
 from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
+from verlet_numba.kernels.relax_graph import relax_graph
 
 OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 
@@ -32,9 +36,9 @@ def advance(world, frames, budget):
     Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
-    particles, runs, runs_softness, sticks, sticks_softness, angles, effects, solver, observed, snapshot, clock = world
+    particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided, effects, solver, observed, snapshot, clock = world
     position, previous, inverse_mass, acceleration = particles
-    gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, friction, restitution = effects
+    gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, features, friction, restitution = effects
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -44,7 +48,7 @@ def advance(world, frames, budget):
                 budget -= 1
                 end = (clock[NUMBER] + 1) * h
                 if clock[SUBSTEP] == substeps - 1:
-                    keep(position, previous, snapshot, touching(contact))
+                    keep(position, previous, snapshot, touching(contact) + pushing(touches, features, meet))
                 fall(acceleration, gravity)
                 blow(position, previous, acceleration, h, wind)
                 resist(position, previous, acceleration, h, drag)
@@ -52,22 +56,34 @@ def advance(world, frames, budget):
                 integrate(position, previous, acceleration, h)              # Verlet (P5)
                 carry(position, end, carried)
                 move(contact, end, moving)
+                move_hulls(hulls, contact, moving)
+                gather(position, hulls)
                 clock[STAGE] = INTEGRATED
-            if not find_contacts(position, previous, inverse_mass, contact):
+            if not find_contacts(position, previous, inverse_mass, contact) or not find_meetings(hulls, meet):
                 return FULL
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
+            touch_hulls(meet, hulls, friction, rigid, touches, HULLS)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
+            begin_features(meet, features)
             forget(runs_softness)
             forget(sticks_softness)
-            for _ in range(passes):
+            remember(position, collided)
+            for again in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
+                part_features(position, inverse_mass, meet, hulls, features)
+                if again:
+                    gather(position, hulls)
                 aim_colliders(position, contact, rigid, touches, h)
+                aim_hulls(meet, hulls, contact, rigid, touches, HULLS, h)
                 respond(rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)
+                if not again:
+                    choose_lists(position, collided, graph)                 # of the particles moved most (P9)
+                snapshot.counts[0] += relax_graph(position, graph, tolerance, approximate)
                 snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
                 snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
                 snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
@@ -75,12 +91,14 @@ def advance(world, frames, budget):
             rebound(friction, rigid, touches)
             kick_back(position, previous, inverse_mass, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word
+            rub_features(position, previous, inverse_mass, meet, hulls, features, friction)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
         f = clock[FRAME]
         sound = observe(frames.measures[f], position, snapshot, observed, h)
-        frames.measures[f, PENETRATION] = penetration(snapshot.position, inverse_mass, contact)
+        frames.measures[f, PENETRATION] = max(penetration(snapshot.position, inverse_mass, contact),
+                                              depth_of_hulls(snapshot.position, meet, hulls))
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
         if not sound:

@@ -63,7 +63,7 @@ def list_contacts(position, previous, inverse_mass, contact, s):
     solids, radii, margin, room = contact.solids, contact.radius, contact.margin, contact.particle.size
     kind, extent, reach = solids.kind[s], extent_of(solids.extent, s), solids.reach[s]
     pose, earlier = pose_of(solids.origin, solids.rotation, s), pose_of(solids.origin_before, solids.rotation_before, s)
-    particle, solid, push = contact.particle, contact.solid, contact.push
+    particle, solid, push, planes_only = contact.particle, contact.solid, contact.push, contact.planes_only
     normal, bound, anchor = contact.normal, contact.bound, contact.anchor
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     c = contact.listed[0]
@@ -74,7 +74,7 @@ def list_contacts(position, previous, inverse_mass, contact, s):
         for k in range(first, last):
             px, py, pz = inward(x[k], y[k], z[k], pose)
             gap, nx, ny, nz = surface(kind, extent, px, py, pz)
-            if gap - radii[k] >= margin or not inverse_mass[k] > 0:
+            if gap - radii[k] >= margin or not inverse_mass[k] > 0 or (planes_only[k] and kind != PLANE):
                 continue
             if c == room:
                 return False
@@ -149,13 +149,13 @@ def penetration(position, inverse_mass, contact):
     """The deepest penetration of any particle [m] into any collider in its pose before this substep; 0 if none."""
     if contact is None:
         return 0.0
-    solids, radii, deepest = contact.solids, contact.radius, 0.0
+    solids, radii, planes_only, deepest = contact.solids, contact.radius, contact.planes_only, 0.0
     x, y, z = position[0], position[1], position[2]
     for s in range(solids.kind.size):
         kind, extent = solids.kind[s], extent_of(solids.extent, s)
         pose = pose_of(solids.origin_before, solids.rotation_before, s)
         for k in range(inverse_mass.size):
-            if inverse_mass[k] > 0:
+            if inverse_mass[k] > 0 and not (planes_only[k] and kind != PLANE):
                 px, py, pz = inward(x[k], y[k], z[k], pose)
                 deepest = max(deepest, radii[k] - surface(kind, extent, px, py, pz)[0])
     return deepest

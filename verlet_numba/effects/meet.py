@@ -2,6 +2,7 @@
 
 from verlet_numba._jit import kernel
 from verlet_numba.effects.contact import pose_of
+from verlet_numba.effects.features import point_of
 from verlet_numba.kernels.candidates import FULL, refresh
 from verlet_numba.kernels.manifold import widen
 from verlet_numba.kernels.narrow import collide, gather_hulls
@@ -50,6 +51,23 @@ def several(hulls, pairs, meetings, manifold):
     if manifold is None:
         return True
     return widen(hulls, pairs, meetings, manifold)
+
+
+@kernel
+def depth_of_hulls(position, meet, hulls):
+    """How deep hulls penetrate each other at the contact points of the last substep [m], with the particles at `position`."""
+    if meet is None:
+        return 0.0
+    x, y, z = position[0], position[1], position[2]
+    corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
+    one, other, corners, particle, rounding = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, hulls.rounding
+    deepest = 0.0
+    for m in range(meet.meetings.listed[0]):
+        px, py, pz = point_of(x, y, z, corners, particle, corner, weight, m, 0)
+        qx, qy, qz = point_of(x, y, z, corners, particle, corner, weight, m, 3)
+        reach = rounding[one[pair[m]]] + rounding[other[pair[m]]]
+        deepest = max(deepest, reach - (normal[0, m] * (px - qx) + normal[1, m] * (py - qy) + normal[2, m] * (pz - qz)))
+    return deepest
 
 
 @kernel

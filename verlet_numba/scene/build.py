@@ -9,8 +9,10 @@ from verlet_numba.buffers import (
     COLUMNS,
     SUBSTEP,
     Array,
+    Collided,
     Effects,
     Frames,
+    Graph,
     Observed,
     Particles,
     Snapshot,
@@ -21,6 +23,7 @@ from verlet_numba.buffers import (
 from verlet_numba.scene import forces
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import carried
+from verlet_numba.scene.constraint_graph import graph_of
 from verlet_numba.scene.constraints import constraints
 from verlet_numba.scene.meeting import contact_of
 from verlet_numba.scene.numbering import Numbering, number, padded, spread
@@ -54,15 +57,25 @@ def build(scene: Scene, bodies: list[Body]) -> Model:
 
     effects = effects_of(scene, bodies, numbering, inverse_mass, real)
     together = attachments(scene, bodies, numbering)
-    joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real)
+    ordered = scene.solver.order == "constraint_graph"
+    joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real, rigid=not ordered)
+    graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
+    collided = collided_of(graph, size, real)
     solver = Solver(step, scene.solver.substeps, scene.solver.iterations,
                     scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
     particles, snapshot = state(size, inverse_mass, effects, real)
     observed = observed_of(scene, bodies, numbering)
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
-    world = World(particles, *joined, effects, solver, observed, snapshot, clock)
+    world = World(particles, *joined, graph, collided, effects, solver, observed, snapshot, clock)
     return Model(scene, bodies, numbering, world)
+
+
+def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
+    """What collisions do to the bodies of a constraint graph."""
+    if graph is None:
+        return None
+    return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.first), -1), np.int64))
 
 
 def effects_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Effects:

@@ -119,12 +119,14 @@ def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
                    gate(np.zeros((3, len(points))), np.float64), paths(points))
 
 
-def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, belongs: Integers, real: Any) -> Contacts | None:
-    """Contact of particles with colliders; `belongs` (n,): the rigid body that answers for a particle, or -1."""
+def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, belongs: Integers, whole: bool,
+             real: Any) -> Contacts | None:
+    """Contact of particles with colliders; belongs (n,): rigid body or -1; whole: those answer for their particles."""
     if not scene.colliders:
         return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
-    return Contacts(solids_of(scene)[1], gate(radius, real), gate(belongs, np.int64), margin(bodies),
+    return Contacts(solids_of(scene)[1], gate(radius, real), gate(belongs if whole else np.full(size, -1), np.int64),
+                    gate(belongs >= 0, np.int64), margin(bodies),
                     gate(np.zeros(1), np.int64), *room(FIRST_ROOM))
 
 

@@ -25,7 +25,7 @@ from verlet_numba.buffers import (
     Touches,
     gate,
 )
-from verlet_numba.scene.body import Body, Floats
+from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import FIRST_ROOM, contacts, moving, solids_of
 from verlet_numba.scene.convex import hulls_of_scene
 from verlet_numba.scene.materials import friction_of, restitution_of
@@ -59,18 +59,18 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_m
     size = len(inverse_mass)
     found, _ = solids_of(scene)
     belongs = belongs_to(bodies, numbering, size)
-    whole = scene.solver.response == "body" and bool((belongs >= 0).any())
-    contact = contacts(scene, bodies, numbering, size, belongs if whole else np.full(size, -1), real)
+    answers = scene.solver.response == "body" and bool((belongs >= 0).any())
+    contact = contacts(scene, bodies, numbering, size, belongs, answers, real)
     hulls = hulls_of_scene(bodies, numbering, found)
     meet = None
     if hulls is not None:
-        still = np.array([body < 0 or not (inverse_mass[belongs == body] > 0).any() for body in hulls.body])
+        still = still_hulls(hulls, belongs, inverse_mass)
         if len(hulls.body) > 1 and not still.all():
             meet = meet_of(scene, hulls, still)
         else:
             hulls = None
     rigid = touches = features = None
-    if whole and (contact is not None or meet is not None):
+    if answers and (contact is not None or meet is not None):
         rigid = rigid_of(bodies, numbering, size, FIRST_ROOM)
         touches = touches_of(FIRST_ROOM, len(rigid.size))
     if meet is not None and hulls is not None and scene.solver.response == "feature":
@@ -80,6 +80,13 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_m
     return Contact(moving(found) if contact is not None else None, contact, hulls, meet, rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, real),
                    restitution_of(scene, found, bodies, numbering, size, hulls, FIRST_ROOM, real))
+
+
+def still_hulls(hulls: Hulls, belongs: Integers, inverse_mass: Floats) -> Array:
+    """(H,) whether nothing moves a hull: a collider's, or of a body that is pinned altogether."""
+    moves = np.zeros(belongs.max() + 2, bool)
+    moves[belongs[(inverse_mass > 0) & (belongs >= 0)]] = True
+    return ~moves[hulls.body]           # the last is what number -1, a collider, finds
 
 
 def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
