@@ -246,6 +246,24 @@ class Pairs(NamedTuple):
     face: Array                 # (6, M) int 1; hit face of the last substep: corner numbers of the first hull, of the second; -1: none
 
 
+class Search(NamedTuple):
+    """What the list of pairs was made for, and the scratch of the search that makes it (kernels/broad.py)."""
+
+    made: Array                 # (1,) int 1; how often a list has been made; 0: never
+    anchor: Array               # (3, H) double m; centres when the list was made
+    extent: Array               # (H,) double m; reach when the list was made and slack: how far from there a hull may get
+    last: Array                 # (3, H) double m; centres at the last call
+    radius: Array               # (H,) double m; of the spheres that are searched
+    level: Array                # (H,) int 1; grid that the sphere stands in, -1: none
+    bucket: Array               # (H,) int 1; cell that it stands in
+    order: Array                # (H,) int 1; hulls, cell by cell
+    sphere: Array               # (4, H) double m; centre and radius, in this order
+    cell: Array                 # (C,) int 1; where each cell's spheres begin
+    edge: Array                 # (G,) double m; of each grid's cells
+    base: Array                 # (G + 1,) int 1; first cell of each grid
+    code: Array                 # (M,) int 1; a pair as one number
+
+
 class Meetings(NamedTuple):
     """Contacts between hulls: points that are weighted corners of either."""
 

@@ -1,0 +1,107 @@
+"""The list of pairs that may meet outlives substeps (Verlet 1967): it is made anew when a hull has left its room.
+
+When the list is made, each hull is given a slack on top of its reach, and pairs are listed whose hulls would come within
+the margin if both used theirs up. A hull that has moved by d and grown by g since then is still inside its room if
+d + g <= slack. While all are, two hulls closer than the margin are listed:
+    |c_i - c_j| then <= |c_i - c_j| now + d_i + d_j < reach_i + reach_j now + margin + d_i + d_j
+                     <= (reach + slack)_i + (reach + slack)_j then + margin.
+"""
+
+import math
+
+from verlet_numba._jit import formula, kernel
+from verlet_numba.kernels import broad
+
+KEPT, RENEWED, FULL = 0, 1, 2
+SLACK = 0.1                     # of the reach: for what rests, or moves otherwise than it did
+FASTER = 1.25                   # of the motion that the last substep foretells
+
+
+@kernel
+def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
+    """Make `pairs` list all hulls that are closer than the margin [m]: KEPT as it is, RENEWED or FULL.
+
+    The first call makes the list; a renewed one shall last for about `horizon` substeps. Pairs that stay keep axis and
+    face; new ones get the difference of the centres, and no face. still (H,): hulls that never move. FULL: nothing has
+    changed; give `pairs` (its contents kept), `spare` and `search.code` more room, all alike, and call again.
+    """
+    known = search.made[0] > 0
+    if known and not outran(hulls.centre, search.anchor, hulls.reach, search.extent):
+        search.last[:] = hulls.centre
+        return KEPT
+    give_room(search.radius, hulls.reach, hulls.centre, search.last, still, 0.5 * margin, horizon, known)
+    if all_pairs:
+        listed = broad.all_pairs(hulls.centre, search.radius, hulls.body, still, spare.first, spare.second)
+    else:
+        listed = broad.sweep(hulls.centre, search.radius, hulls.body, still, spare.first, spare.second, search)
+    if listed == broad.NO_ROOM:
+        return FULL
+    carry(hulls.centre, pairs, spare, pairs.listed[0], listed)
+    replace(pairs, spare, listed)
+    give_room(search.extent, hulls.reach, hulls.centre, search.last, still, 0.0, horizon, known)
+    search.anchor[:] = hulls.centre
+    search.last[:] = hulls.centre
+    search.made[0] += 1
+    return RENEWED
+
+
+@kernel
+def outran(centre, anchor, reach, extent):
+    """Whether a hull has left its room. One that is lost (not a number) has none."""
+    x, y, z, u, v, w = centre[0], centre[1], centre[2], anchor[0], anchor[1], anchor[2]
+    gone = 0
+    for h in range(reach.size):
+        dx, dy, dz, slack = x[h] - u[h], y[h] - v[h], z[h] - w[h], extent[h] - reach[h]
+        gone += dx * dx + dy * dy + dz * dz > slack * abs(slack)
+    return gone > 0
+
+
+@formula
+def slack_of(reach, dx, dy, dz, horizon):
+    """Slack of a hull that moved by (dx, dy, dz) [m] in the last substep."""
+    motion = math.sqrt(dx * dx + dy * dy + dz * dz)
+    return SLACK * reach + FASTER * horizon * (motion if motion < broad.FAR else 0.0)
+
+
+@kernel
+def give_room(room, reach, centre, last, still, more, horizon, known):
+    """Write reach, slack and `more` of every hull; before the first list no motion is known."""
+    x, y, z, u, v, w = centre[0], centre[1], centre[2], last[0], last[1], last[2]
+    moved = 1.0 if known else 0.0
+    for h in range(reach.size):
+        slack = 0.0
+        if not still[h]:
+            slack = slack_of(reach[h], moved * (x[h] - u[h]), moved * (y[h] - v[h]), moved * (z[h] - w[h]), horizon)
+        room[h] = reach[h] + slack + more
+
+
+@kernel
+def carry(centre, pairs, spare, before, listed):
+    """Give the pairs listed in `spare` what they learnt in `pairs`: both ascend, so one walk along them finds all."""
+    x, y, z = centre[0], centre[1], centre[2]
+    old_first, old_second, old_axis, old_face = pairs.first, pairs.second, pairs.axis, pairs.face
+    first, second, axis, face = spare.first, spare.second, spare.axis, spare.face
+    k = 0
+    for m in range(listed):
+        i, j = first[m], second[m]
+        while k < before and (old_first[k] < i or (old_first[k] == i and old_second[k] < j)):
+            k += 1
+        if k < before and old_first[k] == i and old_second[k] == j:
+            for row in range(3):
+                axis[row, m] = old_axis[row, k]
+            for row in range(6):
+                face[row, m] = old_face[row, k]
+        else:
+            axis[0, m], axis[1, m], axis[2, m] = x[i] - x[j], y[i] - y[j], z[i] - z[j]
+            for row in range(6):
+                face[row, m] = -1
+
+
+@kernel
+def replace(pairs, spare, listed):
+    """Copy the pairs listed in `spare`."""
+    pairs.listed[0] = listed
+    pairs.first[:listed] = spare.first[:listed]
+    pairs.second[:listed] = spare.second[:listed]
+    pairs.axis[:, :listed] = spare.axis[:, :listed]
+    pairs.face[:, :listed] = spare.face[:, :listed]
