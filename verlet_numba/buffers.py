@@ -275,6 +275,25 @@ class Meetings(NamedTuple):
     gap: Array                  # (T,) double m; normal . (first point - second point) - roundings; negative: penetration
 
 
+class Manifold(NamedTuple):
+    """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
+
+    points: Array               # (T,) int 1; contacts that each of Meetings becomes, 0: it stays as it is
+    corner: Array               # (6, T) int 1; those contacts, one after another; as in Meetings
+    weight: Array               # (6, T) double 1
+    gap: Array                  # (T,) double m
+    near: Array                 # (Q,) int 1; columns of a hull's corners near its support plane; as many as a hull has
+    spot: Array                 # (4, Q) double m; their coordinates in the plane, height over it, distance to those kept
+    column: Array               # (2, 16) int 1; corners of the two support polygons
+    polygon: Array              # (2, 2, 16) double m; and where they are in the plane
+    distance: Array             # (2, 16, 16) double m; corners of one polygon from the edges of the other
+    place: Array                # (3, 64) double m; points that both polygons share: coordinates in the plane, gap
+    point_corner: Array         # (6, 64) int 1; the same as weighted corners
+    point_weight: Array         # (6, 64) double 1
+    ring: Array                 # (64,) int 1; the order of corners or points around their mean
+    angle: Array                # (64,) double 1
+
+
 class Meet(NamedTuple):
     """How hulls meet."""
 
@@ -297,23 +316,6 @@ class Features(NamedTuple):
     point: int                  # int 1; FEATURE, BODY or PRINTED: which masses place the point where two features meet
     mass: Array                 # (H,) double kg; of the hull's body
     push: Array                 # (T,) double m; how far the features of a meeting have been moved apart in this substep
-class Manifold(NamedTuple):
-    """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
-
-    points: Array               # (T,) int 1; contacts that each of Meetings becomes, 0: it stays as it is
-    corner: Array               # (6, T) int 1; those contacts, one after another; as in Meetings
-    weight: Array               # (6, T) double 1
-    gap: Array                  # (T,) double m
-    near: Array                 # (Q,) int 1; columns of a hull's corners near its support plane; as many as a hull has
-    spot: Array                 # (4, Q) double m; their coordinates in the plane, height over it, distance to those kept
-    column: Array               # (2, 16) int 1; corners of the two support polygons
-    polygon: Array              # (2, 2, 16) double m; and where they are in the plane
-    distance: Array             # (2, 16, 16) double m; corners of one polygon from the edges of the other
-    place: Array                # (3, 64) double m; points that both polygons share: coordinates in the plane, gap
-    point_corner: Array         # (6, 64) int 1; the same as weighted corners
-    point_weight: Array         # (6, 64) double 1
-    ring: Array                 # (64,) int 1; the order of corners or points around their mean
-    angle: Array                # (64,) double 1
 
 
 class Friction(NamedTuple):

@@ -14,8 +14,7 @@ from verlet_numba.effects.wind import blow
 from verlet_numba.frame import FULL, OK, PAUSED, advance
 from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
-from verlet_numba.scene.colliders import room
-from verlet_numba.scene.rigid import touches_of
+from verlet_numba.scene.meeting import roomier
 
 BUDGET = 64                 # substeps between two looks at signals, at first
 PAUSE_SECONDS = 0.1         # the budget doubles while it is done sooner
@@ -71,19 +70,8 @@ def accelerate(world: World) -> None:
 
 
 def grown(world: World) -> World:
-    """The same world with room for twice the contacts; those listed so far are found again."""
-    effects, contact, restitution = world.effects, world.effects.contact, world.effects.restitution
-    assert contact is not None
-    capacity = 2 * contact.particle.size
-    particle, solid, normal, bound, anchor, push = room(capacity)
-    contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
-    if restitution is not None:
-        restitution = restitution._replace(rebound=gate(np.zeros(capacity), np.float64))
-    touches = effects.touches
-    if touches is not None:
-        assert effects.rigid is not None
-        touches = touches_of(capacity, len(effects.rigid.size))
-    return world._replace(effects=effects._replace(contact=contact, restitution=restitution, touches=touches))
+    """The same world with room for twice the contacts; those listed so far in this substep are found again."""
+    return world._replace(effects=roomier(world.effects))
 
 
 def run_chunk(model: Model, chunk: Frames, stop: Callable[[], object] = bool) -> int:

@@ -10,6 +10,7 @@ from verlet_numba.buffers import (
     PRINTED,
     Array,
     Contacts,
+    Effects,
     Features,
     Friction,
     Hulls,
@@ -26,7 +27,7 @@ from verlet_numba.buffers import (
     gate,
 )
 from verlet_numba.scene.body import Body, Floats, Integers
-from verlet_numba.scene.colliders import FIRST_ROOM, contacts, moving, solids_of
+from verlet_numba.scene.colliders import FIRST_ROOM, contacts, moving, room, solids_of
 from verlet_numba.scene.convex import hulls_of_scene
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.numbering import Numbering
@@ -94,7 +95,7 @@ def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
     reach = hulls.reach[hulls.body >= 0]
     several = scene.solver.response == "body"
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
-                narrow_of(hulls), manifold_of(hulls, FIRST_ROOM) if several else None, meetings_of(FIRST_ROOM),
+                narrow_of(hulls), manifold_of(int(hulls.size.max()), FIRST_ROOM) if several else None, meetings_of(FIRST_ROOM),
                 MEETING_MARGIN * float(reach.min()) if several else 0.0, scene.solver.substeps, 1,
                 1 if scene.solver.broad_phase == "all_pairs" else None)
 
@@ -137,9 +138,41 @@ def narrow_of(hulls: Hulls) -> Narrow:
                   whole(faces), whole(3 * faces), whole(3 * faces), whole(2 * corners + 1))
 
 
-def manifold_of(hulls: Hulls, room: int) -> Manifold:
-    """Scratch of manifolds of these hulls, with room for so many meetings."""
-    corners = int(hulls.size.max(initial=0))
+def manifold_of(corners: int, room: int) -> Manifold:
+    """Scratch of manifolds of hulls of at most so many corners, with room for so many meetings."""
     return Manifold(whole(room), whole(6, room), real_(6, room), real_(room), whole(corners), real_(4, corners), whole(2, 16),
                     real_(2, 2, 16), real_(2, 16, 16), real_(3, POINTS_A_PAIR), whole(6, POINTS_A_PAIR), real_(6, POINTS_A_PAIR),
                     whole(POINTS_A_PAIR), real_(POINTS_A_PAIR))
+
+
+def roomier(effects: Effects) -> Effects:
+    """The same effects with room for twice the contacts; what pairs of hulls have learnt stays with them."""
+    contact, meet, rigid, features, restitution = (effects.contact, effects.meet, effects.rigid, effects.features,
+                                                   effects.restitution)
+    capacity, alone = 0, 0
+    if contact is not None:
+        alone = 2 * contact.particle.size
+        names = ("particle", "solid", "normal", "bound", "anchor", "push")
+        contact = contact._replace(**dict(zip(names, room(alone), strict=True)))
+    if restitution is not None:
+        restitution = restitution._replace(rebound=real_(alone))
+    if meet is not None:
+        capacity = 2 * meet.meetings.pair.size
+        pairs, spare = copied(meet.pairs, capacity), pairs_of(capacity)
+        search = meet.search._replace(code=whole(capacity))
+        manifold = None if meet.manifold is None else manifold_of(meet.manifold.near.size, capacity)
+        meet = meet._replace(pairs=pairs, spare=spare, search=search, manifold=manifold, meetings=meetings_of(capacity))
+    if features is not None:
+        features = features._replace(push=real_(capacity))
+    touches = effects.touches
+    if rigid is not None:
+        touches = touches_of(alone + capacity, rigid.size.size)
+    return effects._replace(contact=contact, meet=meet, touches=touches, features=features, restitution=restitution)
+
+
+def copied(pairs: Pairs, capacity: int) -> Pairs:
+    """Pairs with room for more."""
+    larger = pairs_of(capacity)
+    for old, new in zip(pairs, larger, strict=True):
+        new[..., :old.shape[-1]] = old
+    return larger

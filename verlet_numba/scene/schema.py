@@ -60,9 +60,9 @@ class Solver(Part):
     projection_point: Literal["feature", "body", "printed"] = Field(
         default="feature", description="the point onto which `response: feature` projects")
     deformable_contact: Literal["exact", "spheres"] = Field(
-        default="exact", description="contacts of cloth and ropes: vertex-triangle and edge-edge, or spheres")
+        default="spheres", description="contacts of cloth and ropes: vertex-triangle and edge-edge, or spheres")
     orientation_guard: Switch = Field(
-        default=True, description="whether rigid bodies that were turned inside out are restored")
+        default=False, description="whether rigid bodies that were turned inside out are restored")
     gradient: Literal["current", "step_start"] = Field(
         default="current", description="direction of a stick's correction: the present one, or that at the start of "
                                        "the step")

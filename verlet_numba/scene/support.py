@@ -34,16 +34,10 @@ def _is_not(word: object) -> Callable[[Any], bool]:
 _LEAVE_OUT = "leave the key out"
 
 NOT_BUILT = (
-    Missing("solver.preset", _is("paper"), "use `default`"),
-    Missing("solver.order", _is_not("sequential"), "use `sequential`"),
+    Missing("solver.order", _is("lines"), "use `sequential`"),
     Missing("solver.gradient", _is("step_start"), "use `current`"),
-    Missing("solver.repeats", _any, _LEAVE_OUT),
-    Missing("solver.response", _any, _LEAVE_OUT),
-    Missing("solver.projection_point", _any, _LEAVE_OUT),
-    Missing("solver.deformable_contact", _any, _LEAVE_OUT),
-    Missing("solver.broad_phase", _any, _LEAVE_OUT),
-    Missing("solver.orientation_guard", _any, _LEAVE_OUT),
-    Missing("effects.self_collision", _is(True), _LEAVE_OUT),
+    Missing("solver.deformable_contact", _is("exact"), "use `spheres`"),
+    Missing("solver.orientation_guard", _is(True), _LEAVE_OUT),
     Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
     Missing("effects.bending", _named, _LEAVE_OUT),
     Missing("effects.rest", _named, _LEAVE_OUT),
