@@ -35,42 +35,36 @@ def nearest(vertex, n):
 
 
 @formula
-def carried(vertex, n, a, b, c, d):
-    """The point of the simplex with these weights."""
-    x, y, z = a * vertex[0, 0], a * vertex[1, 0], a * vertex[2, 0]
-    if n > 1:
-        x, y, z = x + b * vertex[0, 1], y + b * vertex[1, 1], z + b * vertex[2, 1]
-    if n > 2:
-        x, y, z = x + c * vertex[0, 2], y + c * vertex[1, 2], z + c * vertex[2, 2]
-    if n > 3:
-        x, y, z = x + d * vertex[0, 3], y + d * vertex[1, 3], z + d * vertex[2, 3]
-    return x, y, z
+def carried(vertex, a, b, c, d):
+    """The point with these weights. Where there are fewer vertices than four, the weights of the others are 0."""
+    return (a * vertex[0, 0] + b * vertex[0, 1] + c * vertex[0, 2] + d * vertex[0, 3],
+            a * vertex[1, 0] + b * vertex[1, 1] + c * vertex[1, 2] + d * vertex[1, 3],
+            a * vertex[2, 0] + b * vertex[2, 1] + c * vertex[2, 2] + d * vertex[2, 3])
 
 
 @formula
-def keep(vertex, label, weight, n, a, b, c, d):
-    """Leave only those vertices in the simplex that have a weight. Returns how many."""
+def keep(vertex, label, weight, a, b, c, d):
+    """Leave only those vertices in the simplex that have a weight. Returns how many. There is no branch to mispredict."""
     weight[0], weight[1], weight[2], weight[3] = a, b, c, d
     kept = 0
-    for k in range(n):
-        if weight[k] > 0.0:
-            vertex[0, kept], vertex[1, kept], vertex[2, kept] = vertex[0, k], vertex[1, k], vertex[2, k]
-            label[0, kept], label[1, kept], weight[kept] = label[0, k], label[1, k], weight[k]
-            kept += 1
+    for k in range(4):
+        vertex[0, kept], vertex[1, kept], vertex[2, kept] = vertex[0, k], vertex[1, k], vertex[2, k]
+        label[0, kept], label[1, kept], weight[kept] = label[0, k], label[1, k], weight[k]
+        kept += weight[k] > 0.0
     return kept
 
 
 @formula
 def known(label, n, i, j):
     """Whether the difference of columns i and j is one of the first n vertices."""
+    found = False
     for k in range(n):
-        if label[0, k] == i and label[1, k] == j:
-            return True
-    return False
+        found |= (label[0, k] == i) & (label[1, k] == j)
+    return found
 
 
 @kernel
-def gjk(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, vx, vy, vz, bound,
+def gjk(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, vx, vy, vz, bound,
         vertex, label, weight):
     """Distance of the hulls of the columns from start_a on and from start_b on, v being the axis to begin with.
 
@@ -80,9 +74,9 @@ def gjk(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, s
     """
     n, squared, farthest, i, j = 0, np.inf, 0.0, start_a, start_b
     for _ in range(ITERATIONS):
-        i = support(x, y, z, start_a, size_a, row_a, neighbours, neighbour, seen, i, -vx, -vy, -vz)
-        j = support(x, y, z, start_b, size_b, row_b, neighbours, neighbour, seen, j, vx, vy, vz)
-        wx, wy, wz = x[i] - x[j], y[i] - y[j], z[i] - z[j]
+        i = support(points, start_a, size_a, row_a, neighbours, neighbour, seen, i, -vx, -vy, -vz)
+        j = support(points, start_b, size_b, row_b, neighbours, neighbour, seen, j, vx, vy, vz)
+        wx, wy, wz = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j]
         along = vx * wx + vy * wy + vz * wz
         if along > 0.0 and along * along > bound * bound * (vx * vx + vy * vy + vz * vz):
             return APART, n, vx, vy, vz
@@ -93,11 +87,11 @@ def gjk(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, s
         if d > 0.0 and c > 0.0 and b > 0.0 and a > 0.0:
             weight[0], weight[1], weight[2], weight[3] = a, b, c, d
             return MET, 4, 0.0, 0.0, 0.0
-        ux, uy, uz = carried(vertex, n + 1, a, b, c, d)
+        ux, uy, uz = carried(vertex, a, b, c, d)
         shorter = ux * ux + uy * uy + uz * uz
         if shorter >= squared:
             return NEAR, n, vx, vy, vz
-        n = keep(vertex, label, weight, n + 1, a, b, c, d)
+        n = keep(vertex, label, weight, a, b, c, d)
         vx, vy, vz, squared = ux, uy, uz, shorter
         farthest = max(farthest, wx * wx + wy * wy + wz * wz)
         if squared <= TOUCHING * farthest:

@@ -72,7 +72,7 @@ def drop_flat(vertex, label, weight, n, noise):
                                   vertex[0, r], vertex[1, r], vertex[2, r])
             if found < best:
                 best, skipped = found, k
-        n = keep(vertex, label, weight, 4,
+        n = keep(vertex, label, weight,
                  1.0 * (skipped != 0), 1.0 * (skipped != 1), 1.0 * (skipped != 2), 1.0 * (skipped != 3))
     spanning = 1
     while spanning < n and height(vertex, spanning) > noise:
@@ -81,28 +81,28 @@ def drop_flat(vertex, label, weight, n, noise):
 
 
 @formula
-def remember(x, y, z, vertex, label, n, i, j):
+def remember(points, vertex, label, n, i, j):
     """The difference of columns i and j becomes vertex n."""
-    vertex[0, n], vertex[1, n], vertex[2, n], label[0, n], label[1, n] = x[i] - x[j], y[i] - y[j], z[i] - z[j], i, j
+    vertex[0, n], vertex[1, n], vertex[2, n], label[0, n], label[1, n] = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j], i, j
 
 
 @kernel
-def inflate(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight):
+def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight):
     """Add vertices to the simplex until it has four, or the difference no more dimensions. Returns how many it has."""
     n = drop_flat(vertex, label, weight, n, noise)
     while n < 4:
         farthest, a, b = noise, -1, -1
         for t in range(6 if n == 1 else 4 if n == 2 else 2):
             dx, dy, dz = trial(vertex, n, t)
-            i = support(x, y, z, start_a, size_a, row_a, neighbours, neighbour, seen, start_a, dx, dy, dz)
-            j = support(x, y, z, start_b, size_b, row_b, neighbours, neighbour, seen, start_b, -dx, -dy, -dz)
-            remember(x, y, z, vertex, label, n, i, j)
+            i = support(points, start_a, size_a, row_a, neighbours, neighbour, seen, start_a, dx, dy, dz)
+            j = support(points, start_b, size_b, row_b, neighbours, neighbour, seen, start_b, -dx, -dy, -dz)
+            remember(points, vertex, label, n, i, j)
             far = height(vertex, n)
             if far > farthest:
                 farthest, a, b = far, i, j
         if a < 0:
             return n
-        remember(x, y, z, vertex, label, n, a, b)
+        remember(points, vertex, label, n, a, b)
         n += 1
     return n
 
@@ -226,7 +226,7 @@ def pierced(vertex, corner, plane, faces, f, noise):
 
 
 @kernel
-def expand(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
+def expand(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
            vertex, label, corner, across, plane, visible, horizon, stack):
     """The hit face, from a tetrahedron of the first four vertices: its number. Differences of `noise` [m] are none."""
     tetrahedral(vertex, corner, across, plane, noise)
@@ -235,9 +235,9 @@ def expand(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b
     f = lowest(plane, faces)
     while n < room and 2 * n - 2 <= room_faces:
         nx, ny, nz, distance = plane[0, f], plane[1, f], plane[2, f], plane[3, f]
-        i = support(x, y, z, start_a, size_a, row_a, neighbours, neighbour, seen, i, nx, ny, nz)
-        j = support(x, y, z, start_b, size_b, row_b, neighbours, neighbour, seen, j, -nx, -ny, -nz)
-        remember(x, y, z, vertex, label, n, i, j)
+        i = support(points, start_a, size_a, row_a, neighbours, neighbour, seen, i, nx, ny, nz)
+        j = support(points, start_b, size_b, row_b, neighbours, neighbour, seen, j, -nx, -ny, -nz)
+        remember(points, vertex, label, n, i, j)
         if dot(nx, ny, nz, vertex[0, n], vertex[1, n], vertex[2, n]) - distance <= noise or known(label, n, i, j):
             break
         gone, edges = silhouette(vertex, across, plane, visible, horizon, stack, noise, f, n)
@@ -254,7 +254,7 @@ def expand(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b
 
 
 @kernel
-def hit_face(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
+def hit_face(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
              vertex, label, weight, corner, across, plane, visible, horizon, stack):
     """The hit face of two hulls whose difference has n vertices in a simplex. Differences of `noise` [m] are rounding.
 
@@ -262,9 +262,9 @@ def hit_face(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start
     where it is a point or a line. Of the two sides of a plane, and of all directions across a line or from a point, a fixed one
     is taken.
     """
-    n = inflate(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight)
+    n = inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight)
     if n == SOLID:
-        f = expand(x, y, z, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
+        f = expand(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
                    vertex, label, corner, across, plane, visible, horizon, stack)
         return SOLID, plane[0, f], plane[1, f], plane[2, f], corner[0, f], corner[1, f], corner[2, f]
     if n == POINT:

@@ -45,25 +45,25 @@ def mixed(ax, ay, az, bx, by, bz, u, v):
 
 @formula
 def areas(ax, ay, az, bx, by, bz, cx, cy, cz):
-    """Weights of a, b, c for the projection of the origin onto their plane, each times n . n, and n = (b - a) x (c - a).
+    """Weights of a, b, c for the projection of the origin onto their plane, each times n . n, and n = (a - c) x (b - c).
 
-    They are n . (b x c), n . (c x a) and n . (a x b), with a x b = a x (b - a) and so on.
+    With o = -c the origin seen from c, that of a is (o x (b - c)) . n = o . ((b - c) x n), that of b likewise, and their sum n . n.
     """
-    ux, uy, uz, wx, wy, wz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    ux, uy, uz, wx, wy, wz = ax - cx, ay - cy, az - cz, bx - cx, by - cy, bz - cz
     nx, ny, nz = cross(ux, uy, uz, wx, wy, wz)
-    ox, oy, oz = cross(nx, ny, nz, ax, ay, az)
-    px, py, pz = cross(nx, ny, nz, bx, by, bz)
-    return dot(px, py, pz, cx - bx, cy - by, cz - bz), -dot(ox, oy, oz, wx, wy, wz), dot(ox, oy, oz, ux, uy, uz), nx, ny, nz
+    la = -dot(cx, cy, cz, *cross(wx, wy, wz, nx, ny, nz))
+    lb = -dot(cx, cy, cz, *cross(nx, ny, nz, ux, uy, uz))
+    return la, lb, dot(nx, ny, nz, nx, ny, nz) - la - lb, nx, ny, nz
 
 
 @formula
 def triangle(ax, ay, az, bx, by, bz, cx, cy, cz):
     """Weights of a, b, c."""
     o, p, q, nx, ny, nz = areas(ax, ay, az, bx, by, bz, cx, cy, cz)
-    ux, uy, uz, wx, wy, wz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    flat = dot(nx, ny, nz, nx, ny, nz) <= FLAT_SQUARED * (dot(ux, uy, uz, ux, uy, uz) * dot(wx, wy, wz, wx, wy, wz))
+    ux, uy, uz, wx, wy, wz = ax - cx, ay - cy, az - cz, bx - cx, by - cy, bz - cz
+    whole = dot(nx, ny, nz, nx, ny, nz)
+    flat = whole <= FLAT_SQUARED * (dot(ux, uy, uz, ux, uy, uz) * dot(wx, wy, wz, wx, wy, wz))
     if o > 0.0 and p > 0.0 and q > 0.0 and not flat:
-        whole = o + p + q
         return o / whole, p / whole, q / whole
     best, la, lb, lc = -1.0, 1.0, 0.0, 0.0
     if q <= 0.0 or flat:
@@ -94,20 +94,20 @@ def side(ax, ay, az, bx, by, bz, cx, cy, cz):
 def tetrahedron(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz):
     """Weights of a, b, c, d; all positive: the origin is inside.
 
-    A vertex's weight is the volume that is left when the origin takes its place, over the whole one.
+    A vertex's weight is the volume that is left when the origin takes its place, over the whole one. With o = -d the origin
+    seen from d, that of a is o . ((b - d) x (c - d)).
     """
-    ux, uy, uz, vx, vy, vz, wx, wy, wz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az, dx - ax, dy - ay, dz - az
-    nx, ny, nz = cross(ux, uy, uz, vx, vy, vz)
-    volume = dot(nx, ny, nz, wx, wy, wz)
-    size = dot(nx, ny, nz, nx, ny, nz) * dot(wx, wy, wz, wx, wy, wz)
-    flat = volume * volume <= FLAT_SQUARED * size
-    sign = 1.0 if volume > 0.0 else -1.0
-    ld = -sign * dot(nx, ny, nz, ax, ay, az)
-    lc = -sign * dot(*cross(wx, wy, wz, ux, uy, uz), ax, ay, az)
-    lb = -sign * dot(*cross(vx, vy, vz, wx, wy, wz), ax, ay, az)
-    la = sign * dot(*cross(cx - bx, cy - by, cz - bz, dx - bx, dy - by, dz - bz), bx, by, bz)
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = ax - dx, ay - dy, az - dz, bx - dx, by - dy, bz - dz, cx - dx, cy - dy, cz - dz
+    nx, ny, nz = cross(vx, vy, vz, wx, wy, wz)
+    whole = dot(nx, ny, nz, ux, uy, uz)
+    flat = whole * whole <= FLAT_SQUARED * (dot(nx, ny, nz, nx, ny, nz) * dot(ux, uy, uz, ux, uy, uz))
+    sign = 1.0 if whole > 0.0 else -1.0
+    whole = sign * whole
+    la = -sign * dot(dx, dy, dz, nx, ny, nz)
+    lb = -sign * dot(dx, dy, dz, *cross(wx, wy, wz, ux, uy, uz))
+    lc = -sign * dot(dx, dy, dz, *cross(ux, uy, uz, vx, vy, vz))
+    ld = whole - la - lb - lc
     if la > 0.0 and lb > 0.0 and lc > 0.0 and ld > 0.0 and not flat:
-        whole = la + lb + lc + ld
         return la / whole, lb / whole, lc / whole, ld / whole
     best, a, b, c, d = -1.0, 1.0, 0.0, 0.0, 0.0
     if ld <= 0.0 or flat:
