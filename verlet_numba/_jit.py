@@ -76,6 +76,14 @@ def inlined(function: Function) -> Function:
     return _cached(function, inline="always")
 
 
+def scan(function: Function) -> Function:
+    """Compile a search for the greatest of finite numbers: it is exact in any order, so lanes of a vector may share it.
+
+    The only licence is that no operand is a NaN and that zeros have no sign; sums are not reordered.
+    """
+    return numba.njit(**(FLAGS | {"fastmath": {"nnan", "nsz"}}))(function)  # type: ignore[no-any-return]  # as above
+
+
 def _cached(function: Function, **options: Any) -> Function:
     """Numba reads its cache folder from its configuration while decorating, so that is where it is set."""
     before = config.CACHE_DIR

@@ -1,0 +1,54 @@
+"""Hulls and pairs of them as buffers, for tests of the narrow phase."""
+
+import numpy as np
+
+from verlet_numba.buffers import Hulls, Meetings, Pairs
+
+
+def hulls_of(points, roundings=None, graphs=()):
+    """Hulls of colliders, each the corners (n, 3) given; those whose numbers are in `graphs` get their hull's edges."""
+    from scipy.spatial import ConvexHull
+    sizes = np.array([len(p) for p in points])
+    padded = -(-sizes // 4) * 4
+    start = np.concatenate([[0], np.cumsum(padded)])
+    corner = np.concatenate([np.concatenate([p, np.repeat(p[:1], n - len(p), axis=0)]) for p, n in zip(points, padded, strict=True)])
+    graph, ends, neighbour = np.full(len(points), -1), [0], []
+    for h in graphs:
+        around = [set() for _ in points[h]]
+        for simplex in ConvexHull(points[h]).simplices:
+            for k in simplex:
+                around[k] |= set(simplex.tolist()) - {k}
+        graph[h] = len(ends) - 1
+        for corners in around:
+            neighbour += sorted(corners)
+            ends.append(len(neighbour))
+    rounding = np.zeros(len(points)) if roundings is None else np.asarray(roundings, float)
+    centre = np.array([np.mean(p, axis=0) for p in points]).T
+    reach = np.array([np.linalg.norm(p - c, axis=1).max() for p, c in zip(points, centre.T, strict=True)]) + rounding
+    return Hulls(np.full(len(points), -1), start, sizes, np.full(start[-1], -1), np.ascontiguousarray(corner.T, float),
+                 np.ascontiguousarray(centre), reach, rounding, graph, np.array(ends), np.array(neighbour, np.int64))
+
+
+def pairs_of(first, second):
+    """Pairs that know nothing yet."""
+    first, second = np.array(first, np.int64).reshape(-1), np.array(second, np.int64).reshape(-1)
+    return Pairs(np.array([len(first)]), first, second, np.zeros((3, len(first))), np.full((6, len(first)), -1))
+
+
+def meetings_for(room):
+    """Room for meetings."""
+    return Meetings(np.zeros(1, np.int64), np.zeros(room, np.int64), np.zeros((6, room), np.int64), np.zeros((6, room)),
+                    np.zeros((3, room)), np.zeros(room))
+
+
+def witnesses(hulls, meetings):
+    """The points (3, n) of the first and of the second hull where they meet."""
+    n = meetings.listed[0]
+    points = hulls.corner[:, meetings.corner[:, :n]] * meetings.weight[:, :n]
+    return points[:, :3].sum(axis=1), points[:, 3:].sum(axis=1)
+
+
+def difference_depth(first, second):
+    """Depth of penetration by brute force, from the hull of all differences of corners (n, 3); negative where apart."""
+    from scipy.spatial import ConvexHull
+    return -ConvexHull((first[:, None] - second[None]).reshape(-1, 3)).equations[:, 3].max()

@@ -1,0 +1,250 @@
+"""Narrow phase: which pairs of hulls touch, where and how deep (paper, 5.1 and 6.1).
+
+A pair that is apart has its axis tested; one that met has its hit face tested: while that is still a face of the hulls'
+difference and the origin still projects into it, it is the contact, and neither GJK nor the search for a hit face is needed.
+A lost face and the vertex opposite to it are where the next search begins.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from verlet_numba._jit import formula, kernel
+from verlet_numba.buffers import Hulls, Narrow
+from verlet_numba.kernels.gjk import APART, MET, gjk
+from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
+from verlet_numba.kernels.support import support
+from verlet_numba.physics.simplex import areas, cross, dot, segment, triangle
+
+ROUNDING = 1e-14        # of a hull's reach and its centre's coordinates: differences of heights that mean nothing
+TOUCHING = 1e4          # such differences: a distance that gives no normal
+INSIDE = 1e-9           # of a weight: how far beyond an edge still counts as on it
+POLYTOPE = 128          # vertices of a hulls' difference that the search for a hit face may use
+
+HELD, LOST, AWAY = 0, 1, 2
+
+
+def scratch(hulls: Hulls) -> Narrow:
+    """Scratch for these hulls."""
+    faces, corners = 2 * POLYTOPE - 4, int(hulls.size.max(initial=0))
+
+    def whole(*shape: int) -> Any:
+        return np.zeros(shape, np.int64)
+
+    return Narrow(np.zeros((3, POLYTOPE)), whole(2, POLYTOPE), np.zeros(4), whole(3, faces), whole(3, faces), np.zeros((4, faces)),
+                  whole(faces), whole(3 * faces), whole(3 * faces), whole(2 * corners + 1))
+
+
+@kernel
+def gather_hulls(position, hulls):
+    """Corners and centres from the particles' positions; a collider's corners stay. The reach follows the corners."""
+    px, py, pz = position[0], position[1], position[2]
+    x, y, z, particle = hulls.corner[0], hulls.corner[1], hulls.corner[2], hulls.particle
+    start, size, centre, reach, rounding = hulls.start, hulls.size, hulls.centre, hulls.reach, hulls.rounding
+    for h in range(size.size):
+        first = start[h]
+        cx = cy = cz = 0.0
+        for k in range(first, start[h + 1]):
+            p = particle[k]
+            if p >= 0:
+                x[k], y[k], z[k] = px[p], py[p], pz[p]
+        for k in range(first, first + size[h]):
+            cx, cy, cz = cx + x[k], cy + y[k], cz + z[k]
+        cx, cy, cz = cx / size[h], cy / size[h], cz / size[h]
+        farthest = 0.0
+        for k in range(first, first + size[h]):
+            dx, dy, dz = x[k] - cx, y[k] - cy, z[k] - cz
+            farthest = max(farthest, dx * dx + dy * dy + dz * dz)
+        centre[0, h], centre[1, h], centre[2, h], reach[h] = cx, cy, cz, np.sqrt(farthest) + rounding[h]
+
+@formula
+def merged(p, q, r, u, v, w):
+    """The weights u, v, w of columns p, q, r, those of a repeated column added up under its first."""
+    if q == p:
+        u, v = u + v, 0.0
+    if r == p:
+        u, w = u + w, 0.0
+    elif r == q:
+        v, w = v + w, 0.0
+    return u, v, w
+
+
+@formula
+def convex(u, v, w):
+    """Weights without what is below 0, their sum 1 again."""
+    u, v, w = max(u, 0.0), max(v, 0.0), max(w, 0.0)
+    whole = u + v + w
+    return u / whole, v / whole, w / whole
+
+
+@formula
+def write(corner, weight, normal, gap, t, a, b, c, d, e, f, u, v, w, nx, ny, nz, distance):
+    """Meeting t: columns a, b, c of the first hull and d, e, f of the second, either with the weights u, v, w."""
+    ua, va, wa = convex(*merged(a, b, c, u, v, w))
+    ub, vb, wb = convex(*merged(d, e, f, u, v, w))
+    corner[0, t], corner[1, t], corner[2, t], corner[3, t], corner[4, t], corner[5, t] = a, b, c, d, e, f
+    weight[0, t], weight[1, t], weight[2, t], weight[3, t], weight[4, t], weight[5, t] = ua, va, wa, ub, vb, wb
+    normal[0, t], normal[1, t], normal[2, t], gap[t] = nx, ny, nz, distance
+
+
+@formula
+def feature(points, a, b, c, d, e, f):
+    """The face, edge or vertex of the difference with the vertices a - d, b - e, c - f, the last repeated where there are fewer.
+
+    Returns its normal, away from the hulls' overlap or towards the origin, its distance along it, and the weights of the origin's
+    projection; some may be negative. An edge through the origin has no normal: NaN.
+    """
+    px, py, pz, qx, qy, qz = (points[0, a] - points[0, d], points[1, a] - points[1, d], points[2, a] - points[2, d],
+                              points[0, b] - points[0, e], points[1, b] - points[1, e], points[2, b] - points[2, e])
+    if b == c and e == f:
+        u, v = segment(px, py, pz, qx, qy, qz)
+        px, py, pz = u * px + v * qx, u * py + v * qy, u * pz + v * qz
+        length = np.sqrt(dot(px, py, pz, px, py, pz))
+        return -px / length, -py / length, -pz / length, -length, u, v, 0.0
+    u, v, w, nx, ny, nz = areas(px, py, pz, qx, qy, qz,
+                                points[0, c] - points[0, f], points[1, c] - points[1, f], points[2, c] - points[2, f])
+    whole = dot(nx, ny, nz, nx, ny, nz)
+    length = np.sqrt(whole)
+    nx, ny, nz = nx / length, ny / length, nz / length
+    return nx, ny, nz, dot(nx, ny, nz, px, py, pz), u / whole, v / whole, w / whole
+
+
+@formula
+def holds(a, b, c, d, e, f, u, v, w):
+    """Whether the weighted vertices are points of the hulls, as they are everywhere in the parallelogram of two edges."""
+    u, v, w, s, t, r = *merged(a, b, c, u, v, w), *merged(d, e, f, u, v, w)
+    return min(min(min(u, v), w), min(min(s, t), r)) >= -INSIDE
+
+
+@formula
+def oriented(vertex, label, weight, n):
+    """The simplex that is nearest the origin as a feature, of whose sides the outer one is that towards the origin."""
+    q, r = (0, 0) if n == 1 else (1, n - 1)
+    if n == 3:
+        px, py, pz = vertex[0, 0], vertex[1, 0], vertex[2, 0]
+        nx, ny, nz = cross(vertex[0, 1] - px, vertex[1, 1] - py, vertex[2, 1] - pz,
+                           vertex[0, 2] - px, vertex[1, 2] - py, vertex[2, 2] - pz)
+        if dot(nx, ny, nz, px, py, pz) > 0.0:
+            q, r = 2, 1
+    w = weight[r] if n == 3 else 0.0
+    v = weight[q] if n > 1 else 0.0
+    return label[0, 0], label[0, q], label[0, r], label[1, 0], label[1, q], label[1, r], weight[0], v, w
+
+
+@formula
+def clamped(vertex, p, q, r, nx, ny, nz):
+    """The distance along n of the point nearest the origin on the triangle of these vertices, and its weights."""
+    ax, ay, az, bx, by, bz, cx, cy, cz = (vertex[0, p], vertex[1, p], vertex[2, p], vertex[0, q], vertex[1, q], vertex[2, q],
+                                          vertex[0, r], vertex[1, r], vertex[2, r])
+    u, v, w = triangle(ax, ay, az, bx, by, bz, cx, cy, cz)
+    return dot(nx, ny, nz, u * ax + v * bx + w * cx, u * ay + v * by + w * cy, u * az + v * bz + w * cz), u, v, w
+
+
+@kernel
+def met(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
+        vertex, label, weight, corner, across, plane, visible, horizon, stack):
+    """The hit face from a simplex of n vertices: whether it is a face, its six columns, and as `feature`, with weights of its own."""
+    kind, nx, ny, nz, p, q, r = hit_face(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
+                                         vertex, label, weight, corner, across, plane, visible, horizon, stack)
+    a, b, c, d, e, f = label[0, p], label[0, q], label[0, r], label[1, p], label[1, q], label[1, r]
+    if kind == SOLID:
+        nx, ny, nz, distance, u, v, w = feature(points, a, b, c, d, e, f)
+        if holds(a, b, c, d, e, f, u, v, w):
+            return True, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w
+    distance, u, v, w = clamped(vertex, p, q, r, nx, ny, nz)
+    return kind == SOLID, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w
+
+
+@kernel
+def collide(hulls, pairs, meetings, narrow, margin, coherent):
+    """Contacts of all pairs whose gap is at most `margin` [m], one a pair, in the order of the pairs.
+
+    coherent: None: every pair is met for the first time, and learns nothing. False is returned where there are more meetings
+    than there is room for: grow and call again.
+    """
+    points, centre, reach, rounding = hulls.corner, hulls.centre, hulls.reach, hulls.rounding
+    start, size, graph, neighbours, neighbour = hulls.start, hulls.size, hulls.graph, hulls.neighbours, hulls.neighbour
+    seen, vertex, label, weight, corner, across = (narrow.seen, narrow.vertex, narrow.label, narrow.weight, narrow.corner,
+                                                   narrow.across)
+    plane, visible, horizon, stack = narrow.plane, narrow.visible, narrow.horizon, narrow.stack
+    first, second, axis, face = pairs.first, pairs.second, pairs.axis, pairs.face
+    pair, columns, shares, normal, gap = meetings.pair, meetings.corner, meetings.weight, meetings.normal, meetings.gap
+    listed, fits = 0, True
+    for i in range(pairs.listed[0]):
+        g, h = first[i], second[i]
+        vx, vy, vz = centre[0, g] - centre[0, h], centre[1, g] - centre[1, h], centre[2, g] - centre[2, h]
+        span = reach[g] + reach[h]
+        if dot(vx, vy, vz, vx, vy, vz) > (span + margin) * (span + margin):
+            continue
+        sa, na, ra, sb, nb, rb = start[g], size[g], graph[g], start[h], size[h], graph[h]
+        both = rounding[g] + rounding[h]
+        bound = margin + both
+        noise = ROUNDING * (span + abs(centre[0, g]) + abs(centre[1, g]) + abs(centre[2, g])
+                            + abs(centre[0, h]) + abs(centre[1, h]) + abs(centre[2, h]))
+        found, n, status = False, 0, APART
+        a = b = c = d = e = f = 0
+        nx = ny = nz = distance = u = v = w = 0.0
+        if coherent is not None:
+            if face[0, i] >= 0:
+                a, b, c, d, e, f = (sa + face[0, i], sa + face[1, i], sa + face[2, i],
+                                    sb + face[3, i], sb + face[4, i], sb + face[5, i])
+                nx, ny, nz, distance, u, v, w = feature(points, a, b, c, d, e, f)
+                p = support(points, sa, na, ra, neighbours, neighbour, seen, a, nx, ny, nz)
+                q = support(points, sb, nb, rb, neighbours, neighbour, seen, d, -nx, -ny, -nz)
+                far = dot(nx, ny, nz, points[0, p] - points[0, q], points[1, p] - points[1, q], points[2, p] - points[2, q])
+                if far < -bound:
+                    continue
+                flat = b == c and e == f        # a point or an edge, no face
+                found = far - distance <= noise and holds(a, b, c, d, e, f, u, v, w) and not (flat and -distance <= TOUCHING * noise)
+                if not found and far == far:
+                    vx, vy, vz = -nx, -ny, -nz
+                    if far > 0.0 and not flat:
+                        remember(points, vertex, label, 0, a, d)
+                        remember(points, vertex, label, 1, b, e)
+                        remember(points, vertex, label, 2, c, f)
+                        p = support(points, sa, na, ra, neighbours, neighbour, seen, a, vx, vy, vz)
+                        q = support(points, sb, nb, rb, neighbours, neighbour, seen, d, nx, ny, nz)
+                        remember(points, vertex, label, 3, p, q)
+                        n = 4
+            elif axis[0, i] != 0.0 or axis[1, i] != 0.0 or axis[2, i] != 0.0:
+                vx, vy, vz = axis[0, i], axis[1, i], axis[2, i]
+        if n == 4:
+            solid, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w = met(
+                points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
+                vertex, label, weight, corner, across, plane, visible, horizon, stack)
+            found = solid and distance >= 0.0
+            if found:
+                face[0, i], face[1, i], face[2, i], face[3, i], face[4, i], face[5, i] = a - sa, b - sa, c - sa, d - sb, e - sb, f - sb
+            elif solid:
+                vx, vy, vz = -nx, -ny, -nz
+        if not found:
+            status, n, vx, vy, vz = gjk(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, vx, vy, vz, bound,
+                                        vertex, label, weight)
+            length = np.sqrt(dot(vx, vy, vz, vx, vy, vz))
+            if status == APART or length > bound:
+                if coherent is not None:
+                    axis[0, i], axis[1, i], axis[2, i], face[0, i] = vx / length, vy / length, vz / length, -1
+                continue
+            solid = True
+            if status == MET or length <= TOUCHING * noise:
+                solid, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w = met(
+                    points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
+                    vertex, label, weight, corner, across, plane, visible, horizon, stack)
+            else:
+                a, b, c, d, e, f, u, v, w = oriented(vertex, label, weight, n)
+                nx, ny, nz, distance = -vx / length, -vy / length, -vz / length, -length
+            if coherent is not None:
+                axis[0, i], axis[1, i], axis[2, i], face[0, i] = -nx, -ny, -nz, -1
+                if solid:
+                    face[0, i], face[1, i], face[2, i] = a - sa, b - sa, c - sa
+                    face[3, i], face[4, i], face[5, i] = d - sb, e - sb, f - sb
+        if -distance > bound:
+            continue
+        if listed == gap.size:
+            fits = False
+            break
+        pair[listed] = i
+        write(columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
+        listed += 1
+    meetings.listed[0] = listed
+    return fits
