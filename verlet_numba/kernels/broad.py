@@ -10,7 +10,7 @@ from verlet_numba.buffers import Array, Search
 GRIDS = 48                      # the last takes all that is smaller still
 SMALLEST = 64                   # cells of a grid; from here on no two neighbours of a cell are the same cell
 FEW = 128                       # spheres
-RATIO = 0.5                     # smallest radius over largest in one grid
+RATIO = 0.25                     # smallest radius over largest in one grid
 FAR = 1e100                     # m; what is not nearer and smaller than this has no place
 SAFE = 1 + 2.0**-20
 MIXER = 0x2545F4914F6CDD1D      # spreads the digits of a number (Vigna 2014)
@@ -18,6 +18,7 @@ HULL = 2**32 - 1               # the lower half of a code
 FOLDS = 4                       # of a dense grid upon itself, at most
 BATCH = 32
 NO_ROOM = -1
+ZERO = np.int64(0)              # of no literal type, for which kernels would be compiled once more
 
 
 def search_for(hulls: int, room: int) -> Search:
@@ -58,19 +59,25 @@ def all_pairs(centre, radius, body, still, first, second):
         if not placed(x[i], y[i], z[i], radius[i]):
             continue
         for begin in range(i + 1, radius.size, BATCH):
-            end, touching = min(begin + BATCH, radius.size), 0
-            for j in range(begin, end):
-                touching += touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) & (radius[j] < FAR)
-            if touching == 0:
-                continue
-            for j in range(begin, end):
-                if (touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) and radius[j] < FAR
-                        and may_meet(body[i], body[j], still[i], still[j])):
-                    if listed == first.size:
-                        return NO_ROOM
-                    first[listed], second[listed] = i, j
-                    listed += 1
+            end = min(begin + BATCH, radius.size)
+            if any_touches(x[i], y[i], z[i], radius[i], x[begin:end], y[begin:end], z[begin:end], radius[begin:end]):
+                for j in range(begin, end):
+                    if (touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) and radius[j] < FAR
+                            and may_meet(body[i], body[j], still[i], still[j])):
+                        if listed == first.size:
+                            return NO_ROOM
+                        first[listed], second[listed] = i, j
+                        listed += 1
     return listed
+
+
+@kernel
+def any_touches(x, y, z, radius, xs, ys, zs, radii):
+    """Whether any of some spheres touches a sphere."""
+    touching = 0
+    for j in range(radii.size):
+        touching += touch(x - xs[j], y - ys[j], z - zs[j], radius + radii[j])
+    return touching > 0
 
 
 @kernel
@@ -88,7 +95,7 @@ def sweep(centre, radius, body, still, first, second, search):
 @kernel
 def by_grids(centre, radius, body, still, first, second, search):
     """The search in a hierarchy of grids, however few the spheres: each grid with itself and with the coarser ones."""
-    grids, listed = sort_into_grids(centre, radius, search), 0
+    grids, listed = sort_into_grids(centre, radius, search), ZERO
     for grid in range(grids):
         listed = within(grid, search.grid, search.cell, search.tag, search.sphere, body, still, first, listed)
         for coarser in range(grid):
@@ -104,7 +111,7 @@ def by_grids(centre, radius, body, still, first, second, search):
 def sort_into_grids(centre, radius, search):
     """Share the spheres among grids, each for radii from the largest that is left down to RATIO of it. Returns how many."""
     order, grid = search.order, 0
-    left, base, start = with_a_place(centre, radius, order), 0, 0
+    left, base, start = with_a_place(centre, radius, order), ZERO, ZERO
     while left > 0:
         smaller, largest = parted(radius, order, left, RATIO if grid < GRIDS - 1 else 0.0)
         mine, cells = order[smaller:left], SMALLEST
@@ -248,25 +255,39 @@ def within(grid, grids, cell, tag, sphere, body, still, found, listed):
     return listed
 
 
+@formula
+def spread(x, inverse, radius):
+    """The cell along an axis, and where a sphere's neighbours begin and end, counted from there: -1 or 0, 0 or 1.
+
+    It touches spheres of up to half an edge if their centres are within its radius and half an edge.
+    """
+    number = x * inverse
+    place, reach = number - np.floor(number), radius * inverse + 0.5
+    return along(x, inverse), -1 if place < reach else 0, 1 if place + reach > 1.0 else 0
+
+
 @kernel
 def across(grid, coarser, grids, inverse, cell, tag, sphere, body, still, found, listed):
     """Pairs of a grid's spheres with the larger ones of a coarser grid."""
     base, cells, up, over = grids[0, coarser], grids[1, coarser], grids[2, coarser], grids[3, coarser]
     scale, room = inverse[coarser], found.size
-    rows = (-over - up - 1, -over - 1, -over + up - 1, -up - 1, -1, up - 1, over - up - 1, over - 1, over + up - 1)
     for p in range(cell[grids[0, grid]], cell[grids[0, grid] + grids[1, grid]]):
         x, y, z, r = sphere[p, 0], sphere[p, 1], sphere[p, 2], sphere[p, 3]
-        key = along(x, scale) + along(y, scale) * up + along(z, scale) * over
-        for row in range(9):
-            low = base + ((key + rows[row]) & (cells - 1))
-            for q in range(cell[low], cell[low + 3]):
-                if touch(x - sphere[q, 0], y - sphere[q, 1], z - sphere[q, 2], r + sphere[q, 3]):
-                    i, j = tag[p] & HULL, tag[q] & HULL
-                    if may_meet(body[i], body[j], still[i], still[j]):
-                        if listed >= room:
-                            return room + 1
-                        found[listed] = min(i, j) << 32 | max(i, j)
-                        listed += 1
+        ix, left, right = spread(x, scale, r)
+        iy, front, back = spread(y, scale, r)
+        iz, below, above = spread(z, scale, r)
+        key = ix + left + iy * up + iz * over
+        for dz in range(below, above + 1):
+            for dy in range(front, back + 1):
+                low = base + ((key + dy * up + dz * over) & (cells - 1))
+                for q in range(cell[low], cell[low + right - left + 1]):
+                    if touch(x - sphere[q, 0], y - sphere[q, 1], z - sphere[q, 2], r + sphere[q, 3]):
+                        i, j = tag[p] & HULL, tag[q] & HULL
+                        if may_meet(body[i], body[j], still[i], still[j]):
+                            if listed >= room:
+                                return room + 1
+                            found[listed] = min(i, j) << 32 | max(i, j)
+                            listed += 1
     return listed
 
 
