@@ -254,14 +254,14 @@ class Search(NamedTuple):
     extent: Array               # (H,) double m; reach when the list was made and slack: how far from there a hull may get
     last: Array                 # (3, H) double m; centres at the last call
     radius: Array               # (H,) double m; of the spheres that are searched
-    level: Array                # (H,) int 1; grid that the sphere stands in, -1: none
-    bucket: Array               # (H,) int 1; cell that it stands in
-    order: Array                # (H,) int 1; hulls, cell by cell
-    sphere: Array               # (4, H) double m; centre and radius, in this order
+    order: Array                # (H,) int 1; hulls, those of a grid side by side
+    key: Array                  # (H,) int 1; cell of each, in that order
+    inverse: Array              # (G,) double 1/m; cells a metre, of each grid
+    grid: Array                 # (4, G) int 1; its first entry in `cell`, its cells, their number from one to the next in y and z
     cell: Array                 # (C,) int 1; where each cell's spheres begin
-    edge: Array                 # (G,) double m; of each grid's cells
-    base: Array                 # (G + 1,) int 1; first cell of each grid
-    code: Array                 # (M,) int 1; a pair as one number
+    sphere: Array               # (S, 4) double m; centre and radius, cell by cell
+    tag: Array                  # (S,) int 1; the cell's number and the hull's, as one
+    code: Array                 # (M,) int 1; the hulls' numbers of a pair, as one
 
 
 class Meetings(NamedTuple):

@@ -10,12 +10,15 @@ from verlet_numba.buffers import Array, Search
 GRIDS = 48                      # the last takes all that is smaller still
 SMALLEST = 64                   # cells of a grid; from here on no two neighbours of a cell are the same cell
 FEW = 128                       # spheres
-RATIO = 0.5                     # smallest radius over largest in one grid
+RATIO = 0.25                     # smallest radius over largest in one grid
 FAR = 1e100                     # m; what is not nearer and smaller than this has no place
 SAFE = 1 + 2.0**-20
 MIXER = 0x2545F4914F6CDD1D      # spreads the digits of a number (Vigna 2014)
+HULL = 2**32 - 1               # the lower half of a code
+FOLDS = 4                       # of a dense grid upon itself, at most
 BATCH = 32
 NO_ROOM = -1
+ZERO = np.int64(0)              # of no literal type, for which kernels would be compiled once more
 
 
 def search_for(hulls: int, room: int) -> Search:
@@ -23,11 +26,11 @@ def search_for(hulls: int, room: int) -> Search:
     def real(*shape: int) -> Array:
         return np.zeros(shape)
 
-    def whole(size: int) -> Array:
-        return np.zeros(size, np.int64)
+    def whole(*shape: int) -> Array:
+        return np.zeros(shape, np.int64)
 
-    return Search(whole(1), real(3, hulls), real(hulls), real(3, hulls), real(hulls), whole(hulls), whole(hulls), whole(hulls),
-                  real(4, hulls), whole(4 * hulls + GRIDS * SMALLEST + 2), real(GRIDS), whole(GRIDS + 1), whole(room))
+    return Search(whole(1), real(3, hulls), real(hulls), real(3, hulls), real(hulls), whole(hulls), whole(hulls), real(GRIDS),
+                  whole(4, GRIDS), whole(4 * hulls + GRIDS * (SMALLEST + 4) + 2), real(2 * hulls, 4), whole(2 * hulls), whole(room))
 
 
 @formula
@@ -56,19 +59,25 @@ def all_pairs(centre, radius, body, still, first, second):
         if not placed(x[i], y[i], z[i], radius[i]):
             continue
         for begin in range(i + 1, radius.size, BATCH):
-            end, touching = min(begin + BATCH, radius.size), 0
-            for j in range(begin, end):
-                touching += touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) & (radius[j] < FAR)
-            if touching == 0:
-                continue
-            for j in range(begin, end):
-                if (touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) and radius[j] < FAR
-                        and may_meet(body[i], body[j], still[i], still[j])):
-                    if listed == first.size:
-                        return NO_ROOM
-                    first[listed], second[listed] = i, j
-                    listed += 1
+            end = min(begin + BATCH, radius.size)
+            if any_touches(x[i], y[i], z[i], radius[i], x[begin:end], y[begin:end], z[begin:end], radius[begin:end]):
+                for j in range(begin, end):
+                    if (touch(x[i] - x[j], y[i] - y[j], z[i] - z[j], radius[i] + radius[j]) and radius[j] < FAR
+                            and may_meet(body[i], body[j], still[i], still[j])):
+                        if listed == first.size:
+                            return NO_ROOM
+                        first[listed], second[listed] = i, j
+                        listed += 1
     return listed
+
+
+@kernel
+def any_touches(x, y, z, radius, xs, ys, zs, radii):
+    """Whether any of some spheres touches a sphere."""
+    touching = 0
+    for j in range(radii.size):
+        touching += touch(x - xs[j], y - ys[j], z - zs[j], radius + radii[j])
+    return touching > 0
 
 
 @kernel
@@ -85,15 +94,13 @@ def sweep(centre, radius, body, still, first, second, search):
 
 @kernel
 def by_grids(centre, radius, body, still, first, second, search):
-    """The search in a hierarchy of grids, however few the spheres."""
-    grids = grade(centre, radius, search.level, search.order, search.edge, search.base)
-    fill(centre, radius, search.level, search.edge, search.base, search.bucket, search.cell, search.order, search.sphere, grids)
-    listed = 0
+    """The search in a hierarchy of grids, however few the spheres: each grid with itself and with the coarser ones."""
+    grids, listed = sort_into_grids(centre, radius, search), ZERO
     for grid in range(grids):
-        listed = within(grid, search.base, search.cell, search.order, search.sphere, body, still, first, listed)
+        listed = within(grid, search.grid, search.cell, search.tag, search.sphere, body, still, first, listed)
         for coarser in range(grid):
-            listed = across(grid, coarser, search.base, search.edge, search.cell, search.order, search.sphere, body, still,
-                            first, listed)
+            listed = across(grid, coarser, search.grid, search.inverse, search.cell, search.tag, search.sphere, body, still, first,
+                            listed)
         if listed > first.size:
             return NO_ROOM
     ascend(first, second, search.code, search.cell, listed, radius.size)
@@ -101,49 +108,85 @@ def by_grids(centre, radius, body, still, first, second, search):
 
 
 @kernel
-def grade(centre, radius, level, rest, edge, base):
+def sort_into_grids(centre, radius, search):
     """Share the spheres among grids, each for radii from the largest that is left down to RATIO of it. Returns how many."""
-    x, y, z, left, far = centre[0], centre[1], centre[2], 0, 0.0
-    for h in range(radius.size):
-        level[h] = -1
-        if placed(x[h], y[h], z[h], radius[h]):
-            far = max(far, abs(x[h]), abs(y[h]), abs(z[h]))
-            rest[left] = h
-            left += 1
-    grid = 0
-    base[0] = 0
+    order, grid = search.order, 0
+    left, base, start = with_a_place(centre, radius, order), ZERO, ZERO
     while left > 0:
-        largest, smaller = 0.0, 0
-        for m in range(left):
-            largest = max(largest, radius[rest[m]])
-        for m in range(left):
-            h = rest[m]
-            if radius[h] < RATIO * largest and grid < GRIDS - 1:
-                rest[smaller] = h
-                smaller += 1
-            else:
-                level[h] = grid
-        cells = SMALLEST
-        while cells < 2 * (left - smaller):
+        smaller, largest = parted(radius, order, left, RATIO if grid < GRIDS - 1 else 0.0)
+        mine, cells = order[smaller:left], SMALLEST
+        while cells < 2 * mine.size:
             cells *= 2
-        edge[grid] = edge_for(largest, far)
-        base[grid + 1] = base[grid] + cells
+        inverse, up, over = lattice(centre, mine, largest, cells)
+        start = fill(centre, radius, mine, inverse, cells, up, over, search.key, search.cell[base:base + cells + 4], search.sphere,
+                     search.tag, start)
+        search.inverse[grid] = inverse
+        search.grid[0, grid], search.grid[1, grid], search.grid[2, grid], search.grid[3, grid] = base, cells, up, over
+        base += cells + 4
         left = smaller
         grid += 1
     return grid
 
 
-@formula
-def edge_for(largest, far):
-    """Edge of the cells of a grid for spheres up to a radius, at most so far from the origin [m].
+@kernel
+def with_a_place(centre, radius, order):
+    """Number the spheres that are somewhere. Returns how many."""
+    x, y, z, left = centre[0], centre[1], centre[2], 0
+    for h in range(radius.size):
+        order[left] = h
+        left += placed(x[h], y[h], z[h], radius[h])
+    return left
+
+
+@kernel
+def parted(radius, order, left, ratio):
+    """Put the largest of the first spheres behind the others. Returns how many others there are, and the largest radius."""
+    largest, m, end = 0.0, 0, left
+    for k in range(left):
+        largest = max(largest, radius[order[k]])
+    while m < end:
+        if radius[order[m]] < ratio * largest:
+            m += 1
+        else:
+            end -= 1
+            order[m], order[end] = order[end], order[m]
+    return end, largest
+
+
+@kernel
+def lattice(centre, order, largest, cells):
+    """How space is cut into cells for spheres up to a radius: cells a metre, and their strides in y and z.
+
+    Cell (ix, iy, iz) has the number ix + iy up + iz over modulo the cells N, a power of two: space is wrapped around them and
+    needs no bounds. Neighbours along x lie side by side, the others at constant distances, and no two of the 27 are one.
+    Where the spheres' box has about N cells, they are numbered as in a dense grid: then neighbours are near in memory.
+    Else up/N and over/N are the inverse of the plastic number and its square, which small whole numbers approximate badly:
+    cells near each other, in a block or a slab of about N, have numbers of their own, wherever the box ends.
 
     Spheres that touch must stand in neighbouring cells, whatever is rounded: the edge is a little more than twice the
-    radius, and far from the origin a power of two, which divides exactly.
+    radius, and far from the origin a power of two, by which numbers divide exactly.
     """
     edge = max(2 * SAFE * largest, 2.0**-300)
-    if far < 2.0**30 * edge:
-        return edge
-    return math.ldexp(1.0, math.frexp(edge)[1])
+    low_x, high_x = bounds(centre[0], order)
+    low_y, high_y = bounds(centre[1], order)
+    low_z, high_z = bounds(centre[2], order)
+    if max(-low_x, high_x, -low_y, high_y, -low_z, high_z) > 2.0**30 * edge:
+        edge = math.ldexp(1.0, math.frexp(edge)[1])
+    wide, deep, high = (high_x - low_x) / edge + 1, (high_y - low_y) / edge + 1, (high_z - low_z) / edge + 1
+    up = max(math.ceil(wide), 3.0)
+    over = max(up * math.ceil(deep), 2 * up + 3)
+    if 2 * (1 + up + over) < cells and wide * deep * high < FOLDS * cells:
+        return 1 / edge, np.int64(up), np.int64(over)
+    return 1 / edge, np.int64(0.7548776662466927 * cells) | 1, np.int64(0.5698402909980532 * cells) | 1
+
+
+@kernel
+def bounds(x, order):
+    """Smallest and largest coordinate."""
+    low = high = x[order[0]]
+    for h in order:
+        low, high = min(low, x[h]), max(high, x[h])
+    return low, high
 
 
 @formula
@@ -157,106 +200,94 @@ def along(x, inverse):
     return (((digits ^ (digits >> 32)) + exponent) * MIXER) >> 33
 
 
-@formula
-def stride_y(cells):
-    return np.int64(0.7548776662466927 * cells) | 1
+@kernel
+def fill(centre, radius, order, inverse, cells, up, over, key, cell, sphere, tag, start):
+    """Sort a grid's spheres by cell, to stand from `start` on (counting sort). Returns where they end.
 
-
-@formula
-def stride_z(cells):
-    return np.int64(0.5698402909980532 * cells) | 1
-
-
-@formula
-def key_of(x, y, z, edge, cells):
-    """Cell of a grid that a place falls into: a lattice wraps space around the cells, so that it needs no bounds.
-
-    key = ix + iy A + iz B modulo the number of cells N, a power of two: neighbours along x lie side by side, the
-    others at constant distances. A/N and B/N are the inverse of the plastic number and its square, which no small
-    whole numbers approximate: cells near each other, in a block or a slab of about N, have keys of their own.
+    cell[k] becomes the place of the first sphere of cell k. The first two cells stand once more behind the last: so three
+    cells in a row are never parted.
     """
-    inverse = 1 / edge
-    return (along(x, inverse) + along(y, inverse) * stride_y(cells) + along(z, inverse) * stride_z(cells)) & (cells - 1)
-
-
-@kernel
-def fill(centre, radius, level, edge, base, bucket, cell, order, sphere, grids):
-    """Sort the spheres by cell (counting sort): cell[b] becomes the place of the first sphere of cell b, of all grids."""
-    x, y, z, total = centre[0], centre[1], centre[2], base[grids]
-    sx, sy, sz, sr = sphere[0], sphere[1], sphere[2], sphere[3]
-    cell[:total + 2] = 0
-    for h in range(radius.size):
-        grid = level[h]
-        if grid >= 0:
-            bucket[h] = base[grid] + key_of(x[h], y[h], z[h], edge[grid], base[grid + 1] - base[grid])
-            cell[bucket[h] + 2] += 1
-    for b in range(2, total + 2):
-        cell[b] += cell[b - 1]
-    for h in range(radius.size):
-        if level[h] >= 0:
-            p = cell[bucket[h] + 1]
-            cell[bucket[h] + 1] += 1
-            order[p] = h
-            sx[p], sy[p], sz[p], sr[p] = x[h], y[h], z[h], radius[h]
+    x, y, z = centre[0], centre[1], centre[2]
+    cell[:] = 0
+    for m in range(order.size):
+        h = order[m]
+        key[m] = (along(x[h], inverse) + along(y[h], inverse) * up + along(z[h], inverse) * over) & (cells - 1)
+        cell[key[m] + 2] += 1
+    cell[cells + 2], cell[cells + 3] = cell[2], cell[3]
+    cell[0], cell[1] = start, start
+    for k in range(2, cells + 4):
+        cell[k] += cell[k - 1]
+    for m in range(order.size):
+        h, k = order[m], key[m]
+        put(h, k, x, y, z, radius, cell, sphere, tag)
+        if k < 2:
+            put(h, k + cells, x, y, z, radius, cell, sphere, tag)
+    return cell[cells + 2]
 
 
 @inlined
-def meet(p, begin, end, x, y, z, r, order, body, still, found, listed):
-    """Add the pairs of sphere p with those from begin to end that it touches; found.size + 1: no room."""
-    i = order[p]
-    for q in range(begin, end):
-        if touch(x[p] - x[q], y[p] - y[q], z[p] - z[q], r[p] + r[q]):
-            j = order[q]
-            if may_meet(body[i], body[j], still[i], still[j]):
-                if listed >= found.size:
-                    return found.size + 1
-                found[listed] = min(i, j) << 32 | max(i, j)
-                listed += 1
-    return listed
-
-
-@inlined
-def meet_row(p, low, start, cells, cell, x, y, z, r, order, body, still, found, listed):
-    """The same with the spheres of three cells in a row, which may go on at the grid's first cell."""
-    listed = meet(p, cell[start + low], cell[start + min(low + 3, cells)], x, y, z, r, order, body, still, found, listed)
-    if low + 3 > cells:
-        listed = meet(p, cell[start], cell[start + low + 3 - cells], x, y, z, r, order, body, still, found, listed)
-    return listed
+def put(h, k, x, y, z, radius, cell, sphere, tag):
+    """Put a sphere into a cell."""
+    p = cell[k + 1]
+    cell[k + 1] += 1
+    sphere[p, 0], sphere[p, 1], sphere[p, 2], sphere[p, 3] = x[h], y[h], z[h], radius[h]
+    tag[p] = k << 32 | h
 
 
 @kernel
-def within(grid, base, cell, order, sphere, body, still, found, listed):
+def within(grid, grids, cell, tag, sphere, body, still, found, listed):
     """Pairs within a grid: each cell with itself and with that half of its 26 neighbours that comes after it."""
-    x, y, z, r = sphere[0], sphere[1], sphere[2], sphere[3]
-    start, cells = base[grid], base[grid + 1] - base[grid]
-    up, over = stride_y(cells), stride_z(cells)
-    rows = (up - 1, over - up - 1, over - 1, over + up - 1)
-    for key in range(cells):
-        for p in range(cell[start + key], cell[start + key + 1]):
-            listed = meet(p, p + 1, cell[start + min(key + 2, cells)], x, y, z, r, order, body, still, found, listed)
-            if key == cells - 1:
-                listed = meet(p, cell[start], cell[start + 1], x, y, z, r, order, body, still, found, listed)
-            for row in rows:
-                listed = meet_row(p, (key + row) & (cells - 1), start, cells, cell, x, y, z, r, order, body, still, found, listed)
-            if listed > found.size:
-                return listed
+    base, cells, up, over = grids[0, grid], grids[1, grid], grids[2, grid], grids[3, grid]
+    rows, room = (0, up - 1, over - up - 1, over - 1, over + up - 1), found.size
+    for p in range(cell[base], cell[base + cells]):
+        x, y, z, r, key = sphere[p, 0], sphere[p, 1], sphere[p, 2], sphere[p, 3], tag[p] >> 32
+        for row in range(5):
+            low = base + ((key + rows[row]) & (cells - 1))
+            begin, end = (cell[low], cell[low + 3]) if row > 0 else (p + 1, cell[low + 2])
+            for q in range(begin, end):
+                if touch(x - sphere[q, 0], y - sphere[q, 1], z - sphere[q, 2], r + sphere[q, 3]):
+                    i, j = tag[p] & HULL, tag[q] & HULL
+                    if may_meet(body[i], body[j], still[i], still[j]):
+                        if listed >= room:
+                            return room + 1
+                        found[listed] = min(i, j) << 32 | max(i, j)
+                        listed += 1
     return listed
 
 
+@formula
+def spread(x, inverse, radius):
+    """The cell along an axis, and where a sphere's neighbours begin and end, counted from there: -1 or 0, 0 or 1.
+
+    It touches spheres of up to half an edge if their centres are within its radius and half an edge.
+    """
+    number = x * inverse
+    place, reach = number - np.floor(number), radius * inverse + 0.5
+    return along(x, inverse), -1 if place < reach else 0, 1 if place + reach > 1.0 else 0
+
+
 @kernel
-def across(grid, coarser, base, edge, cell, order, sphere, body, still, found, listed):
+def across(grid, coarser, grids, inverse, cell, tag, sphere, body, still, found, listed):
     """Pairs of a grid's spheres with the larger ones of a coarser grid."""
-    x, y, z, r = sphere[0], sphere[1], sphere[2], sphere[3]
-    start, cells = base[coarser], base[coarser + 1] - base[coarser]
-    up, over = stride_y(cells), stride_z(cells)
-    for p in range(cell[base[grid]], cell[base[grid + 1]]):
-        key = key_of(x[p], y[p], z[p], edge[coarser], cells) - 1
-        for across_z in (-over, 0, over):
-            for across_y in (-up, 0, up):
-                listed = meet_row(p, (key + across_y + across_z) & (cells - 1), start, cells, cell, x, y, z, r, order, body, still,
-                                  found, listed)
-        if listed > found.size:
-            return listed
+    base, cells, up, over = grids[0, coarser], grids[1, coarser], grids[2, coarser], grids[3, coarser]
+    scale, room = inverse[coarser], found.size
+    for p in range(cell[grids[0, grid]], cell[grids[0, grid] + grids[1, grid]]):
+        x, y, z, r = sphere[p, 0], sphere[p, 1], sphere[p, 2], sphere[p, 3]
+        ix, left, right = spread(x, scale, r)
+        iy, front, back = spread(y, scale, r)
+        iz, below, above = spread(z, scale, r)
+        key = ix + left + iy * up + iz * over
+        for dz in range(below, above + 1):
+            for dy in range(front, back + 1):
+                low = base + ((key + dy * up + dz * over) & (cells - 1))
+                for q in range(cell[low], cell[low + right - left + 1]):
+                    if touch(x - sphere[q, 0], y - sphere[q, 1], z - sphere[q, 2], r + sphere[q, 3]):
+                        i, j = tag[p] & HULL, tag[q] & HULL
+                        if may_meet(body[i], body[j], still[i], still[j]):
+                            if listed >= room:
+                                return room + 1
+                            found[listed] = min(i, j) << 32 | max(i, j)
+                            listed += 1
     return listed
 
 
@@ -265,11 +296,11 @@ def ascend(first, second, code, place, listed, hulls):
     """Sort pairs that stand as first << 32 | second in `first`: two counting sorts, by the second and then by the first."""
     place[:hulls + 2] = 0
     for m in range(listed):
-        place[(first[m] & 0xFFFFFFFF) + 2] += 1
+        place[(first[m] & HULL) + 2] += 1
     for h in range(2, hulls + 2):
         place[h] += place[h - 1]
     for m in range(listed):
-        h = (first[m] & 0xFFFFFFFF) + 1
+        h = (first[m] & HULL) + 1
         code[place[h]] = first[m]
         place[h] += 1
     place[:hulls + 2] = 0
@@ -279,5 +310,5 @@ def ascend(first, second, code, place, listed, hulls):
         place[h] += place[h - 1]
     for m in range(listed):
         h = (code[m] >> 32) + 1
-        first[place[h]], second[place[h]] = code[m] >> 32, code[m] & 0xFFFFFFFF
+        first[place[h]], second[place[h]] = code[m] >> 32, code[m] & HULL
         place[h] += 1

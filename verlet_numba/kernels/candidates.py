@@ -27,7 +27,7 @@ def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
     """
     known = search.made[0] > 0
     if known and not outran(hulls.centre, search.anchor, hulls.reach, search.extent):
-        search.last[:] = hulls.centre
+        remember(hulls.centre, search.last)
         return KEPT
     give_room(search.radius, hulls.reach, hulls.centre, search.last, still, 0.5 * margin, horizon, known)
     if all_pairs:
@@ -39,8 +39,8 @@ def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
     carry(hulls.centre, pairs, spare, pairs.listed[0], listed)
     replace(pairs, spare, listed)
     give_room(search.extent, hulls.reach, hulls.centre, search.last, still, 0.0, horizon, known)
-    search.anchor[:] = hulls.centre
-    search.last[:] = hulls.centre
+    remember(hulls.centre, search.anchor)
+    remember(hulls.centre, search.last)
     search.made[0] += 1
     return RENEWED
 
@@ -101,7 +101,23 @@ def carry(centre, pairs, spare, before, listed):
 def replace(pairs, spare, listed):
     """Copy the pairs listed in `spare`."""
     pairs.listed[0] = listed
-    pairs.first[:listed] = spare.first[:listed]
-    pairs.second[:listed] = spare.second[:listed]
-    pairs.axis[:, :listed] = spare.axis[:, :listed]
-    pairs.face[:, :listed] = spare.face[:, :listed]
+    copy(spare.first, pairs.first, listed)
+    copy(spare.second, pairs.second, listed)
+    for row in range(3):
+        copy(spare.axis[row], pairs.axis[row], listed)
+    for row in range(6):
+        copy(spare.face[row], pairs.face[row], listed)
+
+
+@kernel
+def remember(centre, places):
+    """Copy centres."""
+    for row in range(3):
+        copy(centre[row], places[row], centre.shape[1])
+
+
+@kernel
+def copy(source, target, size):
+    """Copy the first entries."""
+    for k in range(size):
+        target[k] = source[k]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verlet_numba.kernels.broad import GRIDS, NO_ROOM, all_pairs, by_grids, search_for, stride_y, stride_z, sweep
+from verlet_numba.kernels.broad import GRIDS, NO_ROOM, all_pairs, by_grids, lattice, search_for, sweep
 
 SEEDS = 1000
 SCALES = (1e-6, 1.0, 1e6)
@@ -133,7 +133,7 @@ def test_points_far_apart_for_their_size_share_no_cell(radius):
     first, second = np.zeros((2, 100_000), np.int64)
     listed = by_grids(centre, np.full(size, radius), np.arange(size), np.zeros(size, bool), first, second, search)
     assert list(zip(first[:listed], second[:listed], strict=True)) == pairs(all_pairs, centre, np.full(size, radius), room=100_000)
-    filled = np.diff(search.cell[:search.base[1] + 1])
+    filled = np.diff(search.cell[:search.grid[1, 0] + 1])
     assert filled.max() < 100
 
 
@@ -144,23 +144,29 @@ def test_one_lost_sphere_does_not_crowd_the_others():
     search = search_for(3000, 100_000)
     first, second = np.zeros((2, 100_000), np.int64)
     by_grids(centre, radius, np.arange(3000), np.zeros(3000, bool), first, second, search)
-    assert np.diff(search.cell[:search.base[1] + 1]).max() < 40
+    assert np.diff(search.cell[:search.grid[1, 0] + 1]).max() < 40
+
+
+BOXES = [(1e9, 1e9, 1e9), (16, 16, 16), (64, 64, 1), (1, 64, 64), (64, 1, 64), (256, 4, 4), (4, 256, 4), (4, 4, 256), (1, 1, 1)]
 
 
 @pytest.mark.parametrize("power", range(6, 31))
-def test_no_two_neighbours_of_a_cell_are_the_same_cell(power):
+@pytest.mark.parametrize("shape", BOXES)
+def test_no_two_neighbours_of_a_cell_are_the_same_cell(shape, power):
     """Else a pair would be listed twice."""
-    cells, steps = 2**power, (-1, 0, 1)
-    keys = {(i + j * stride_y(cells) + k * stride_z(cells)) % cells for i in steps for j in steps for k in steps}
-    assert len(keys) == 27
+    cells, steps = 2**power, np.array([-1, 0, 1])
+    ends = np.array([np.zeros(3), np.array(shape)]).T.copy()
+    _, up, over = lattice(ends, np.arange(2), 0.5, cells)
+    assert np.unique((steps[:, None, None] + steps[:, None] * up + steps * over) % cells).size == 27
 
 
-@pytest.mark.parametrize("shape", [(16, 16, 16), (64, 64, 1), (1, 64, 64), (64, 1, 64), (256, 4, 4), (4, 256, 4), (4, 4, 256)])
-def test_cells_of_a_block_or_slab_have_keys_of_their_own(shape):
-    cells = 2**14
-    i, j, k = np.indices(shape)
-    used = np.unique((i + j * stride_y(cells) + k * stride_z(cells)) % cells, return_counts=True)[1]
-    assert used.max() <= 2
+@pytest.mark.parametrize("shape", BOXES[1:])
+def test_cells_of_a_block_or_slab_have_numbers_of_their_own(shape):
+    ends = np.array([np.zeros(3), np.array(shape) - 0.5]).T.copy()
+    for cells, most in ((2**15, 1), (2**14, 2), (2**12, 4)):
+        _, up, over = lattice(ends, np.arange(2), 0.5, cells)
+        i, j, k = np.indices(shape)
+        assert np.unique((i + j * up + k * over) % cells, return_counts=True)[1].max() <= most
 
 
 def test_more_sizes_than_grids():
