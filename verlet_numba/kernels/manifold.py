@@ -16,9 +16,10 @@ than a point, the parts near these planes are edges or faces, and the contact is
 - Two edges cross in one point, unless they are parallel: then the points are the ends of the part over which they are
   within PARALLEL of each other, seen along n.
 
-All points lie in both hulls: none is deeper than the support planes tell, and each has a gap of its own. Beyond eight,
-the point that spans the least area with its neighbours goes, one after another; the deepest stays. Where a rounded tip
-of many corners leaves all points shallower than the contact that was there, that one is kept as well.
+All points lie in both hulls: none is deeper than the support planes tell, and each has a gap of its own. Points go that
+lie within FLAT of the line through their neighbours (boxes of one size, stacked a little askew, share an octagon that is
+all but a square) and, beyond eight, those nearest to it, one after another; the deepest stays. Where a rounded tip of
+many corners leaves all points shallower than the contact that was there, that one is kept as well.
 
 Lengths are relative to the hulls, coordinates to the contact: results move and turn with the hulls, at any scale.
 """
@@ -29,6 +30,7 @@ from verlet_numba._jit import formula, inlined, kernel
 
 NEAR = 0.01         # of a hull's reach: how near corners are to the support plane, and how near to each other to be one
 PARALLEL = 1e-4     # of the smaller reach: how far edges side by side may be apart; a polygon as thin is an edge
+FLAT = 1e-3         # of the smaller reach: a point as near to the line through its neighbours spans nothing
 SLACK = 1e-9        # of the smaller reach: how far a corner may be outside of an edge that it touches
 ROUNDING = 1e-15    # of coordinates: what they are off by, and more
 SIDES = 16          # corners of a support polygon, at most
@@ -68,7 +70,7 @@ def widen(hulls, pairs, meetings, scratch):
         if found < 2:
             continue
         measure(x, y, z, origin, n, rounding[a] + rounding[b], found, place, point_corner, point_weight)
-        kept, shallow = choose(place, found, gap[t] + slack, ring, angle)
+        kept, shallow = choose(place, found, gap[t] + 2.0 * slack, FLAT * min(reach[a], reach[b]), slack, ring, angle)
         total = kept + shallow
         extra += total - 1
         if listed + extra > pair.size:
@@ -170,16 +172,23 @@ def measure(x, y, z, origin, n, rounding, found, place, corner, weight):
 
 
 @kernel
-def choose(place, found, level, ring, angle):
-    """Order the points by angle and leave out what is too many. Returns how many stay, and whether all gaps are above a level."""
-    deepest = 0
+def choose(place, found, level, flat, slack, ring, angle):
+    """Order the points by angle and leave out those that span next to nothing, and what is too many.
+
+    Returns how many stay, and whether all gaps are above a level. Of points that are equally deep, the one to be kept is
+    the outermost, seen from the narrow phase's contact.
+    """
+    lowest, keep, outermost = math.inf, -1, -1.0
     for k in range(found):
         ring[k] = k
-        if place[2, k] < place[2, deepest]:
-            deepest = k
-    shallow = place[2, deepest] > level
+        lowest = min(lowest, place[2, k])
+    for k in range(found):
+        away = place[0, k] * place[0, k] + place[1, k] * place[1, k]
+        if place[2, k] <= lowest + slack and away > outermost:
+            keep, outermost = k, away
+    shallow = place[2, keep] > level
     arrange(place, found, ring, angle)
-    return trim(place, found, POINTS - shallow, -math.inf, deepest, ring), shallow
+    return trim(place, found, POINTS - shallow, flat, keep, ring), shallow
 
 
 @formula
@@ -225,7 +234,7 @@ def support_polygon(x, y, z, start, size, reach, origin, u, v, n, near, spot, ri
             sides = 2
         else:
             arrange(spot, sides, ring, angle)
-            sides = trim(spot, sides, SIDES, SLACK * reach * reach, -1, ring)
+            sides = trim(spot, sides, SIDES, SLACK * reach, -1, ring)
     for k in range(sides):
         column[k] = near[ring[k]]
         polygon[0, k], polygon[1, k] = spot[0, ring[k]], spot[1, ring[k]]
@@ -302,18 +311,20 @@ def arrange(spot, number, ring, angle):
 
 @kernel
 def trim(spot, number, most, least, keep, ring):
-    """Take points out of a ring, that of the least area first (Visvalingam and Whyatt 1993). Returns how many are left.
+    """Take points out of a ring, the one nearest to the line through its neighbours first. Returns how many are left.
 
-    The area is the parallelogram of a point's two sides, negative where the ring turns inwards. Points go as long as
-    there are more than `most`, or one has no more than the area `least`; the point `keep` stays.
+    Points go as long as there are more than `most`, or one is not farther from that line than `least`, on the inner side
+    of it, or where the ring turns inwards. The point `keep` stays, and so do the two ends of a ring that is as thin.
     """
     while number > 2:
         worst, smallest = -1, math.inf
         for k in range(number):
             i, j, l = ring[k - 1] if k else ring[number - 1], ring[k], ring[k + 1] if k + 1 < number else ring[0]
-            area = ((spot[0, j] - spot[0, i]) * (spot[1, l] - spot[1, j]) - (spot[1, j] - spot[1, i]) * (spot[0, l] - spot[0, j]))
-            if area < smallest and j != keep:
-                worst, smallest = k, area
+            ax, ay, bx, by = spot[0, j] - spot[0, i], spot[1, j] - spot[1, i], spot[0, l] - spot[0, j], spot[1, l] - spot[1, j]
+            height = (ax * by - ay * bx) / math.sqrt((ax + bx) * (ax + bx) + (ay + by) * (ay + by))
+            end = abs(height) <= least and ax * bx + ay * by < 0.0
+            if height < smallest and j != keep and not end:
+                worst, smallest = k, height
         if worst < 0 or (number <= most and smallest > least):
             break
         number -= 1
