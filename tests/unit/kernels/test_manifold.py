@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from verlet_numba.buffers import Hulls, Manifold, Meetings, Pairs
-from verlet_numba.kernels.manifold import NEAR, PARALLEL, POINTS, widen
+from verlet_numba.kernels.manifold import FLAT, NEAR, PARALLEL, POINTS, widen
 
 UP = np.array([0.0, 0.0, 1.0])
 BOX = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
@@ -161,6 +161,13 @@ def clipped(subject, polygon):
     return subject
 
 
+def least_height(polygon):
+    """The least distance of a corner from the line through its neighbours."""
+    before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
+    area = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return (area / np.linalg.norm(before + after, axis=1)).min()
+
+
 def seen(corners, n):
     """Coordinates across n."""
     return corners @ np.linalg.svd(n[None])[2][1:].T
@@ -179,6 +186,10 @@ def turned(angle, tilt=0.0, axis=0.0):
     return Rotation.from_rotvec([tilt * np.cos(axis), tilt * np.sin(axis), 0]) * Rotation.from_rotvec([0, 0, angle])
 
 
+def moved(hull, x, y=0.0):
+    return hull + np.array([x, y, 0])
+
+
 def on(a, b, gap=0.0):
     """Hull a moved along the vertical so that it rests on b, a gap above."""
     return a + UP * (b[:, 2].max() - a[:, 2].min() + gap)
@@ -194,8 +205,8 @@ def test_faces_share_the_polygon_that_clipping_finds(upper, lower, seed):
     rng = np.random.default_rng(seed)
     pose = Rotation.random(random_state=seed)
     n = pose.apply(UP)
-    a = turned(rng.uniform(0, 7), 0.002 * (seed % 2), rng.uniform(0, 7)).apply(SHAPES[upper] * rng.uniform(0.3, 1.5, (1, 3)))
-    a = pose.apply(on(a + np.append(rng.uniform(-0.5, 0.5, 2), 0), SHAPES[lower], rng.uniform(-0.01, 0.01)))
+    a = turned(rng.uniform(0, 7), 0.002 * (seed % 2), rng.uniform(0, 7)).apply(SHAPES[upper] * rng.uniform(0.3, 1, (1, 3)))
+    a = pose.apply(on(moved(a, *rng.uniform(-0.5, 0.5, 2)), SHAPES[lower], rng.uniform(-0.01, 0.01)))
     b = pose.apply(SHAPES[lower])
     shared = clipped(supporting(a, n), supporting(b, n))
     if not len(shared):
@@ -203,7 +214,8 @@ def test_faces_share_the_polygon_that_clipping_finds(upper, lower, seed):
     found = widened(a, b, n)
     flat = seen(np.array([pa for pa, _, _ in found]), n)
     if len(shared) <= POINTS:
-        assert hull_area(flat) == pytest.approx(hull_area(shared), rel=1e-9)
+        exact = least_height(shared) > 1.1 * FLAT       # shapes here have a reach below 1.1
+        assert hull_area(flat) == pytest.approx(hull_area(shared), rel=1e-9 if exact else 10 * FLAT)
     else:
         assert len(flat) == POINTS
         assert 0.9 * hull_area(shared) < hull_area(flat) < hull_area(shared)
@@ -211,16 +223,16 @@ def test_faces_share_the_polygon_that_clipping_finds(upper, lower, seed):
 
 
 @pytest.mark.parametrize(("angle", "number", "area"), [(0, 4, 1.0), (np.pi / 6, 8, 0.8453), (np.pi / 4, 8, 2 * 2**0.5 - 2),
-                                                       (1e-12, 4, 1.0), (np.pi / 2, 4, 1.0)])
+                                                       (1e-12, 4, 1.0), (1e-8, 4, 1.0), (1e-4, 4, 1.0), (np.pi / 2, 4, 1.0)])
 def test_stacked_boxes(angle, number, area):
     found = widened(on(turned(angle).apply(BOX), BOX), BOX, UP)
     assert len(found) == number
-    assert hull_area(np.array([pa[:2] for pa, _, _ in found])) == pytest.approx(area, abs=1e-4 if angle == np.pi / 6 else 1e-9)
+    assert hull_area(np.array([pa[:2] for pa, _, _ in found])) == pytest.approx(area, abs=1e-4)
     np.testing.assert_allclose([gap for _, _, gap in found], 0, atol=1e-12)
 
 
 def test_small_box_on_a_large_one_and_below_it():
-    small = on(turned(0.3).apply(0.01 * BOX) + [3, 2, 0], 100 * BOX)
+    small = on(moved(turned(0.3).apply(0.01 * BOX), 3, 2), 100 * BOX)
     for a, b, n in ((small, 100 * BOX, UP), (100 * BOX, small, -UP)):
         found = widened(a, b, n)
         assert len(found) == 4
@@ -252,7 +264,7 @@ def test_parallel_edges_touch_in_two_points_and_in_one_when_turned():
     edge = Rotation.from_euler("x", 45, degrees=True).apply(BOX)
     apart = []
     for angle in (0, 1e-12, 1e-6, 1e-4, 3e-4, 1e-3, 3e-3, 0.1):
-        found = widened(on(turned(angle).apply(edge) + [0.2, 0, 0], edge), edge, UP)
+        found = widened(on(moved(turned(angle).apply(edge), 0.2), edge), edge, UP)
         apart.append(np.linalg.norm(found[0][0] - found[-1][0]))
     assert apart[:3] == pytest.approx([0.8] * 3, abs=1e-6)
     assert apart[-1] == 0
@@ -275,12 +287,10 @@ def test_boxes_tilt_from_four_points_to_two_to_one():
 def test_pancakes(tilt):
     """Upper corners are near the support plane too; the gaps are those of the lower ones."""
     pancake = BOX * [1, 1, 1e-3]
-    found = widened(on(turned(0.4, tilt).apply(pancake), pancake), pancake, UP)
-    gaps = np.array([gap for _, _, gap in found])
+    a = turned(0.4 if tilt < 0.01 else 0, tilt).apply(pancake)
+    found = widened(on(a, pancake), pancake, UP)
     assert len(found) == (8 if tilt < 0.01 else 2)
-    for (pa, _, gap), expected in zip(found, gaps, strict=True):
-        assert gap == expected
-        a = turned(0.4, tilt).apply(pancake)
+    for pa, _, gap in found:
         assert gap == pytest.approx(np.tan(tilt) * (pa[1] - a[np.argmin(a[:, 2]), 1]), abs=1e-9)
 
 
@@ -294,8 +304,8 @@ def test_needle_of_any_roll_rests_on_its_lowest_side():
 
 
 def test_same_pose_faces_that_touch_at_an_edge_and_collinear_corners_are_finite():
-    beside = BOX + [1, 0, 0]
-    beads = np.concatenate([BOX, BOX + [0.5, 0, 0], BOX * [1, 1, 1]])
+    beside = moved(BOX, 1)
+    beads = np.concatenate([BOX, moved(BOX, 0.5), BOX])
     for a, b in ((BOX, BOX), (on(beside, BOX), BOX), (on(beads, BOX), BOX), (on(BOX, beads), beads)):
         found = widened(a, b, UP)
         assert np.isfinite(np.array([gap for _, _, gap in found])).all()
@@ -340,12 +350,12 @@ UNIT = st.floats(-1, 1)
 @settings(max_examples=80, deadline=None)
 def test_points_move_and_turn_with_the_hulls_and_are_the_same_for_the_pair_swapped(upper, lower, angle, tilt, shift, seed, swap):
     b = -SHAPES[lower]
-    a = on(turned(angle, tilt, 0.3).apply(SHAPES[upper] * [0.9, 0.8, 0.7]) + [0.213, 0.117, 0], b, -1e-3)
+    a = on(moved(turned(angle, tilt, 0.3).apply(SHAPES[upper] * [0.9, 0.8, 0.7]), 0.213, 0.117), b, -1e-3)
     pose = Rotation.random(random_state=seed)
-    moved = [pose.apply(hull) + shift for hull in (a, b)]
+    posed = [pose.apply(hull) + shift for hull in (a, b)]
     n = pose.apply(UP)
     before = widened(a, b, UP)
-    after = widened(*moved[::-1], -n) if swap else widened(*moved, n)
+    after = widened(*posed[::-1], -n) if swap else widened(*posed, n)
     assert len(before) == len(after)
     expected = pose.apply(np.array([(pa + pb) / 2 for pa, pb, _ in before])) + shift
     for pa, pb, _ in after:
