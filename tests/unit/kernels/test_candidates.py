@@ -41,7 +41,8 @@ class Crowd:
         """Pairs whose spheres are nearer than the margin, by their definition."""
         centre, reach, body = self.hulls.centre, self.hulls.reach, self.hulls.body
         i, j = np.triu_indices(reach.size, 1)
-        gap = np.sqrt(((centre[:, i] - centre[:, j]) ** 2).sum(0)) - reach[i] - reach[j]
+        with np.errstate(over="ignore", invalid="ignore"):
+            gap = np.sqrt(((centre[:, i] - centre[:, j]) ** 2).sum(0)) - reach[i] - reach[j]
         may = ~((body[i] == body[j]) & (body[i] >= 0)) & ~(self.still[i] & self.still[j]) & (gap < self.margin)
         return set(zip(i[may].tolist(), j[may].tolist(), strict=True))
 
