@@ -8,9 +8,9 @@ Milliseconds a list on one core, icosahedra that fill a tenth of a cube / with a
 
 | hulls   | all pairs          | sort and sweep along x | grids              |
 |      50 |   .003  .003  .003 |   .004  .005  .002     |   .010  .010  .010 |
-|   1,000 |   .32   .34   .32  |   .16   .16   .07      |   .07   .11   .23  |
-|  10,000 | 24     24    25    |  14    14    2.6       |  1.1   1.4   3.0   |
-| 100,000 |                    | 960   940   420        | 20    22    49     |
+|   1,000 |   .32   .34   .32  |   .16   .16   .07      |   .12   .17   .26  |
+|  10,000 | 24     24    25    |  14    14    2.6       |  1.2   1.7   3.2   |
+| 100,000 |                    | 960   940   420        | 17    19    49     |
 
 A sweep along one axis meets whatever overlaps there, n^(5/3) pairs in a cube. Up to 128 hulls all pairs are quickest.
 """
@@ -29,7 +29,7 @@ RATIO = 0.25                    # smallest radius over largest in one grid
 FAR = 1e100                     # m; what is not nearer and smaller than this has no place
 SAFE = 1 + 2.0**-20
 MIXER = 0x2545F4914F6CDD1D      # spreads the digits of a number (Vigna 2014)
-HULL = 2**32 - 1               # the lower half of a code
+HULL = 2**32 - 1                # the lower half of a code
 FOLDS = 4                       # of a dense grid upon itself, at most
 BATCH = 32
 NO_ROOM = -1
@@ -44,8 +44,9 @@ def search_for(hulls: int, room: int) -> Search:
     def whole(*shape: int) -> Array:
         return np.zeros(shape, np.int64)
 
-    return Search(whole(1), real(3, hulls), real(hulls), real(3, hulls), real(hulls), whole(hulls), whole(hulls), real(GRIDS),
-                  whole(4, GRIDS), whole(4 * hulls + GRIDS * (SMALLEST + 4) + 2), real(2 * hulls, 4), whole(2 * hulls), whole(room))
+    return Search(whole(1), real(3, hulls), real(hulls), real(2, 3, hulls), whole(1), real(hulls), whole(hulls), whole(hulls),
+                  real(GRIDS), whole(4, GRIDS), whole(4 * hulls + GRIDS * (SMALLEST + 4) + 2), real(2 * hulls, 4), whole(2 * hulls),
+                  whole(room))
 
 
 @formula

@@ -30,34 +30,38 @@ def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
     face; new ones get the difference of the centres, and no face. still (H,): hulls that never move. FULL: nothing has
     changed; give `pairs` (its contents kept), `spare` and `search.code` more room, all alike, and call again.
     """
-    known = search.made[0] > 0
-    if known and not outran(hulls.centre, search.anchor, hulls.reach, search.extent):
-        remember(hulls.centre, search.last)
+    known, turn = search.made[0] > 0, search.turn[0]
+    centre, now, before = hulls.centre, search.last[turn], search.last[1 - turn]
+    if not outran(centre, search.anchor, hulls.reach, search.extent, now) and known:
+        search.turn[0] = 1 - turn
         return KEPT
-    give_room(search.radius, hulls.reach, hulls.centre, search.last, still, 0.5 * margin, horizon, known)
+    give_room(search.radius, hulls.reach, centre, before, still, 0.5 * margin, horizon, known)
     if all_pairs:
-        listed = broad.all_pairs(hulls.centre, search.radius, hulls.body, still, spare.first, spare.second)
+        listed = broad.all_pairs(centre, search.radius, hulls.body, still, spare.first, spare.second)
     else:
-        listed = broad.sweep(hulls.centre, search.radius, hulls.body, still, spare.first, spare.second, search)
+        listed = broad.sweep(centre, search.radius, hulls.body, still, spare.first, spare.second, search)
     if listed == broad.NO_ROOM:
         return FULL
-    carry(hulls.centre, pairs, spare, pairs.listed[0], listed)
+    carry(centre, pairs, spare, pairs.listed[0], listed)
     replace(pairs, spare, listed)
-    give_room(search.extent, hulls.reach, hulls.centre, search.last, still, 0.0, horizon, known)
-    remember(hulls.centre, search.anchor)
-    remember(hulls.centre, search.last)
+    give_room(search.extent, hulls.reach, centre, before, still, 0.0, horizon, known)
+    for row in range(3):
+        copy(centre[row], search.anchor[row], hulls.reach.size)
+    search.turn[0] = 1 - turn
     search.made[0] += 1
     return RENEWED
 
 
 @kernel
-def outran(centre, anchor, reach, extent):
-    """Whether a hull has left its room. One that is lost (not a number) has none."""
+def outran(centre, anchor, reach, extent, now):
+    """Whether a hull has left its room; one that is lost (not a number) has none. Copies the centres on the way."""
     x, y, z, u, v, w = centre[0], centre[1], centre[2], anchor[0], anchor[1], anchor[2]
+    a, b, c = now[0], now[1], now[2]
     gone = 0
     for h in range(reach.size):
         dx, dy, dz, slack = x[h] - u[h], y[h] - v[h], z[h] - w[h], extent[h] - reach[h]
         gone += dx * dx + dy * dy + dz * dz > slack * abs(slack)
+        a[h], b[h], c[h] = x[h], y[h], z[h]
     return gone > 0
 
 
@@ -112,13 +116,6 @@ def replace(pairs, spare, listed):
         copy(spare.axis[row], pairs.axis[row], listed)
     for row in range(6):
         copy(spare.face[row], pairs.face[row], listed)
-
-
-@kernel
-def remember(centre, places):
-    """Copy centres."""
-    for row in range(3):
-        copy(centre[row], places[row], centre.shape[1])
 
 
 @kernel
