@@ -252,7 +252,8 @@ class Search(NamedTuple):
     made: Array                 # (1,) int 1; how often a list has been made; 0: never
     anchor: Array               # (3, H) double m; centres when the list was made
     extent: Array               # (H,) double m; reach when the list was made and slack: how far from there a hull may get
-    last: Array                 # (3, H) double m; centres at the last call
+    last: Array                 # (2, 3, H) double m; centres at the last two calls
+    turn: Array                 # (1,) int 1; which of these two is the older
     radius: Array               # (H,) double m; of the spheres that are searched
     order: Array                # (H,) int 1; hulls, those of a grid side by side
     key: Array                  # (H,) int 1; cell of each, in that order
