@@ -32,7 +32,7 @@ def scratch(hulls: Hulls) -> Narrow:
         return np.zeros(shape, np.int64)
 
     return Narrow(np.zeros((3, POLYTOPE)), whole(2, POLYTOPE), np.zeros(4), whole(3, faces), whole(3, faces), np.zeros((4, faces)),
-                  whole(faces), whole(3 * faces), whole(3 * faces), whole(2 * corners + 1))
+                  whole(faces), whole(3 * faces + 3), whole(3 * faces + 3), whole(2 * corners + 1))
 
 
 @kernel
