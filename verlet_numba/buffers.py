@@ -283,11 +283,11 @@ class Narrow(NamedTuple):
     label: Array                # (2, V) int 1; the columns of Hulls.corner that it is the difference of
     weight: Array               # (4,) double 1; of the simplex' vertices, the point nearest the origin
     corner: Array               # (3, F) int 1; vertices of a face of the polytope, counterclockwise from outside
-    across: Array               # (3, F) int 1; three times the face beyond its edge e (corner e to e + 1), plus the edge's number there
+    across: Array               # (3, F) int 1; four times the face beyond its edge e (corner e to e + 1), plus the edge's number there
     plane: Array                # (4, F) double 1; outward normal and distance from the origin [m]; infinite: no area
     visible: Array              # (F,) int 1; faces that the new vertex sees
-    horizon: Array              # (3F,) int 1; edges around them, as in `across`
-    stack: Array                # (3F,) int 1; edges still to cross
+    horizon: Array              # (3F + 3,) int 1; edges around them, as in `across`
+    stack: Array                # (3F + 3,) int 1; edges still to cross
     seen: Array                 # (2S + 1,) int 1; of S corners: the flood that came by last, a queue; at the end: floods so far
 
 

@@ -11,9 +11,9 @@ A difference without volume (flat bodies in one plane, crossing rods, two points
 import numpy as np
 
 from verlet_numba._jit import formula, kernel
-from verlet_numba.kernels.gjk import keep, known, nearest
+from verlet_numba.kernels.gjk import keep, known
 from verlet_numba.kernels.support import support
-from verlet_numba.physics.simplex import cross, dot, side, triangle
+from verlet_numba.physics.simplex import areas, cross, dot, side
 
 POINT, LINE, PLANE, SOLID = 1, 2, 3, 4      # what the difference is: so many vertices span it
 
@@ -62,8 +62,23 @@ def height(vertex, n):
 
 
 @formula
+def spacious(vertex, noise):
+    """Whether the first four vertices span a volume: that of the parallelepiped, over the square of its longest edge, is no
+    more than any of the heights. No root and no division, for the common case.
+    """
+    px, py, pz = vertex[0, 0], vertex[1, 0], vertex[2, 0]
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = (vertex[0, 1] - px, vertex[1, 1] - py, vertex[2, 1] - pz,
+                                          vertex[0, 2] - px, vertex[1, 2] - py, vertex[2, 2] - pz,
+                                          vertex[0, 3] - px, vertex[1, 3] - py, vertex[2, 3] - pz)
+    longest = max(max(dot(ux, uy, uz, ux, uy, uz), dot(vx, vy, vz, vx, vy, vz)), dot(wx, wy, wz, wx, wy, wz))
+    return abs(dot(*cross(ux, uy, uz, vx, vy, vz), wx, wy, wz)) > noise * longest
+
+
+@formula
 def drop_flat(vertex, label, weight, n, noise):
     """Take vertices from a simplex that spans less than it should, leaving the side nearest the origin. Returns how many stay."""
+    if n == 4 and spacious(vertex, noise):
+        return 4
     if n == 4 and height(vertex, 1) > noise and height(vertex, 2) > noise and height(vertex, 3) <= noise:
         best, skipped = np.inf, 3
         for k in range(4):
@@ -108,6 +123,24 @@ def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b
 
 
 @formula
+def edge(f, e):
+    """Edge e of face f, from its corner e to the next, as one number."""
+    return 4 * f + e
+
+
+@formula
+def ends(code):
+    """The face and the edge of a number."""
+    return code >> 2, code & 3
+
+
+@formula
+def following(k, n):
+    """k + 1, after n - 1 again 0."""
+    return k + 1 if k + 1 < n else 0
+
+
+@formula
 def place(vertex, corner, across, plane, noise, f, a, b, c, beyond_ab, beyond_bc, beyond_ca):
     """Face f becomes the triangle of vertices a, b, c."""
     ax, ay, az = vertex[0, a], vertex[1, a], vertex[2, a]
@@ -120,8 +153,8 @@ def place(vertex, corner, across, plane, noise, f, a, b, c, beyond_ab, beyond_bc
     if size <= noise * noise * longest:
         plane[0, f], plane[1, f], plane[2, f], plane[3, f] = 0.0, 0.0, 0.0, np.inf
     else:
-        length = np.sqrt(size)
-        nx, ny, nz = nx / length, ny / length, nz / length
+        inverse = 1.0 / np.sqrt(size)
+        nx, ny, nz = nx * inverse, ny * inverse, nz * inverse
         plane[0, f], plane[1, f], plane[2, f], plane[3, f] = nx, ny, nz, nx * ax + ny * ay + nz * az
 
 
@@ -133,10 +166,10 @@ def tetrahedral(vertex, corner, across, plane, noise):
                        vertex[0, 2] - px, vertex[1, 2] - py, vertex[2, 2] - pz)
     above = dot(nx, ny, nz, vertex[0, 3] - px, vertex[1, 3] - py, vertex[2, 3] - pz) > 0.0
     a, b = (2, 1) if above else (1, 2)
-    place(vertex, corner, across, plane, noise, 0, 0, a, b, 3 * 1 + 2, 3 * 2 + 2, 3 * 3 + 2)
-    place(vertex, corner, across, plane, noise, 1, 0, 3, a, 3 * 3 + 1, 3 * 2 + 0, 3 * 0 + 0)
-    place(vertex, corner, across, plane, noise, 2, a, 3, b, 3 * 1 + 1, 3 * 3 + 0, 3 * 0 + 1)
-    place(vertex, corner, across, plane, noise, 3, b, 3, 0, 3 * 2 + 1, 3 * 1 + 0, 3 * 0 + 2)
+    place(vertex, corner, across, plane, noise, 0, 0, a, b, edge(1, 2), edge(2, 2), edge(3, 2))
+    place(vertex, corner, across, plane, noise, 1, 0, 3, a, edge(3, 1), edge(2, 0), edge(0, 0))
+    place(vertex, corner, across, plane, noise, 2, a, 3, b, edge(1, 1), edge(3, 0), edge(0, 1))
+    place(vertex, corner, across, plane, noise, 3, b, 3, 0, edge(2, 1), edge(1, 0), edge(0, 2))
 
 
 @formula
@@ -153,14 +186,15 @@ def silhouette(vertex, across, plane, visible, horizon, stack, noise, f, w):
     while waiting > 0:
         waiting -= 1
         code = stack[waiting]
-        g, e = code // 3, code % 3
+        g, e = ends(code)
         distance = plane[3, g]
         if distance == -np.inf:
             continue
         if distance == np.inf or plane[0, g] * wx + plane[1, g] * wy + plane[2, g] * wz - distance > -noise:
             visible[seen], plane[3, g] = g, -np.inf
             seen += 1
-            stack[waiting], stack[waiting + 1] = across[(e + 2) % 3, g], across[(e + 1) % 3, g]
+            e = following(e, 3)
+            stack[waiting], stack[waiting + 1] = across[following(e, 3), g], across[e, g]
             waiting += 2
         else:
             horizon[edges] = code
@@ -174,9 +208,9 @@ def ring(corner, horizon, seen, edges):
     if edges != seen + 2:
         return False
     for k in range(edges):
-        g, e = horizon[k] // 3, horizon[k] % 3
-        h, d = horizon[(k + 1) % edges] // 3, horizon[(k + 1) % edges] % 3
-        if corner[e, g] != corner[(d + 1) % 3, h]:
+        g, e = ends(horizon[k])
+        h, d = ends(horizon[following(k, edges)])
+        if corner[e, g] != corner[following(d, 3), h]:
             return False
     return True
 
@@ -190,36 +224,44 @@ def slot(visible, seen, faces, k):
 @formula
 def cone(vertex, corner, across, plane, visible, horizon, noise, seen, edges, faces, w):
     """The faces between the horizon and vertex w take the place of those that it sees."""
+    before, f = slot(visible, seen, faces, edges - 1), slot(visible, seen, faces, 0)
     for k in range(edges):
-        g, e = horizon[k] // 3, horizon[k] % 3
-        f = slot(visible, seen, faces, k)
-        after, before = slot(visible, seen, faces, (k + 1) % edges), slot(visible, seen, faces, (k + edges - 1) % edges)
-        across[e, g] = 3 * f
-        place(vertex, corner, across, plane, noise, f, corner[(e + 1) % 3, g], corner[e, g], w, horizon[k], 3 * after + 2, 3 * before + 1)
+        g, e = ends(horizon[k])
+        after = slot(visible, seen, faces, following(k, edges))
+        across[e, g] = edge(f, 0)
+        place(vertex, corner, across, plane, noise, f, corner[following(e, 3), g], corner[e, g], w,
+              horizon[k], edge(after, 2), edge(before, 1))
+        before, f = f, after
 
 
 @formula
 def lowest(plane, faces):
     """The face nearest the origin, the first of equals."""
-    best = 0
+    best, distance = 0, plane[3, 0]
     for f in range(1, faces):
-        if plane[3, f] < plane[3, best]:
-            best = f
+        best = f if plane[3, f] < distance else best
+        distance = plane[3, f] if plane[3, f] < distance else distance
     return best
+
+
+@formula
+def corners_of(vertex, corner, f):
+    """The corners of face f."""
+    p, q, r = corner[0, f], corner[1, f], corner[2, f]
+    return (vertex[0, p], vertex[1, p], vertex[2, p], vertex[0, q], vertex[1, q], vertex[2, q],
+            vertex[0, r], vertex[1, r], vertex[2, r])
 
 
 @kernel
 def pierced(vertex, corner, plane, faces, f, noise):
     """Of the faces as near the origin as f, the one that its projection falls into: several may lie in one plane."""
+    u, v, w, _, _, _ = areas(*corners_of(vertex, corner, f))
+    if u > 0.0 and v > 0.0 and w > 0.0:
+        return f
     best, chosen, limit = np.inf, f, plane[3, f] + noise
-    for k in range(-1, faces):
-        g = f if k < 0 else k
+    for g in range(faces):
         if plane[3, g] <= limit:
-            p, q, r = corner[0, g], corner[1, g], corner[2, g]
-            u, v, w, found = side(vertex[0, p], vertex[1, p], vertex[2, p], vertex[0, q], vertex[1, q], vertex[2, q],
-                                  vertex[0, r], vertex[1, r], vertex[2, r])
-            if u > 0.0 and v > 0.0 and w > 0.0:
-                return g
+            _, _, _, found = side(*corners_of(vertex, corner, g))
             if found < best:
                 best, chosen = found, g
     return chosen

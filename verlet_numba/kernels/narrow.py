@@ -13,12 +13,12 @@ from verlet_numba._jit import formula, kernel
 from verlet_numba.buffers import Hulls, Narrow
 from verlet_numba.kernels.gjk import APART, MET, gjk
 from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
+from verlet_numba.kernels.meeting import holds, write
 from verlet_numba.kernels.support import support
 from verlet_numba.physics.simplex import areas, cross, dot, segment, triangle
 
 ROUNDING = 1e-14        # of a hull's reach and its centre's coordinates: differences of heights that mean nothing
 TOUCHING = 1e4          # such differences: a distance that gives no normal
-INSIDE = 1e-9           # of a weight: how far beyond an edge still counts as on it
 POLYTOPE = 128          # vertices of a hulls' difference that the search for a hit face may use
 
 HELD, LOST, AWAY = 0, 1, 2
@@ -32,7 +32,7 @@ def scratch(hulls: Hulls) -> Narrow:
         return np.zeros(shape, np.int64)
 
     return Narrow(np.zeros((3, POLYTOPE)), whole(2, POLYTOPE), np.zeros(4), whole(3, faces), whole(3, faces), np.zeros((4, faces)),
-                  whole(faces), whole(3 * faces), whole(3 * faces), whole(2 * corners + 1))
+                  whole(faces), whole(3 * faces + 3), whole(3 * faces + 3), whole(2 * corners + 1))
 
 
 @kernel
@@ -58,36 +58,6 @@ def gather_hulls(position, hulls):
         centre[0, h], centre[1, h], centre[2, h], reach[h] = cx, cy, cz, np.sqrt(farthest) + rounding[h]
 
 @formula
-def merged(p, q, r, u, v, w):
-    """The weights u, v, w of columns p, q, r, those of a repeated column added up under its first."""
-    if q == p:
-        u, v = u + v, 0.0
-    if r == p:
-        u, w = u + w, 0.0
-    elif r == q:
-        v, w = v + w, 0.0
-    return u, v, w
-
-
-@formula
-def convex(u, v, w):
-    """Weights without what is below 0, their sum 1 again."""
-    u, v, w = max(u, 0.0), max(v, 0.0), max(w, 0.0)
-    whole = u + v + w
-    return u / whole, v / whole, w / whole
-
-
-@formula
-def write(corner, weight, normal, gap, t, a, b, c, d, e, f, u, v, w, nx, ny, nz, distance):
-    """Meeting t: columns a, b, c of the first hull and d, e, f of the second, either with the weights u, v, w."""
-    ua, va, wa = convex(*merged(a, b, c, u, v, w))
-    ub, vb, wb = convex(*merged(d, e, f, u, v, w))
-    corner[0, t], corner[1, t], corner[2, t], corner[3, t], corner[4, t], corner[5, t] = a, b, c, d, e, f
-    weight[0, t], weight[1, t], weight[2, t], weight[3, t], weight[4, t], weight[5, t] = ua, va, wa, ub, vb, wb
-    normal[0, t], normal[1, t], normal[2, t], gap[t] = nx, ny, nz, distance
-
-
-@formula
 def feature(points, a, b, c, d, e, f):
     """The face, edge or vertex of the difference with the vertices a - d, b - e, c - f, the last repeated where there are fewer.
 
@@ -107,13 +77,6 @@ def feature(points, a, b, c, d, e, f):
     length = np.sqrt(whole)
     nx, ny, nz = nx / length, ny / length, nz / length
     return nx, ny, nz, dot(nx, ny, nz, px, py, pz), u / whole, v / whole, w / whole
-
-
-@formula
-def holds(a, b, c, d, e, f, u, v, w):
-    """Whether the weighted vertices are points of the hulls, as they are everywhere in the parallelogram of two edges."""
-    u, v, w, s, t, r = *merged(a, b, c, u, v, w), *merged(d, e, f, u, v, w)
-    return min(min(min(u, v), w), min(min(s, t), r)) >= -INSIDE
 
 
 @formula
@@ -244,7 +207,7 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent):
             fits = False
             break
         pair[listed] = i
-        write(columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
+        write(points, columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
         listed += 1
     meetings.listed[0] = listed
     return fits
