@@ -71,23 +71,25 @@ class Softness(NamedTuple):
 class Graph(NamedTuple):
     """Rigid bodies relaxed outwards from the particle that a collision moved most (paper, 6.2).
 
-    A kind of bodies shares topology, rest lengths and masses. It has a bucket for the template's own order and one for
-    every particle, each with its list of sticks; bodies of one bucket are relaxed side by side.
+    A kind of bodies shares topology and weights, not rest lengths. It has a bucket for the template's own order and one
+    for every particle, each with its list of sticks; bodies of one bucket are relaxed side by side.
     """
 
-    first: Array                # (G,) int 1; inner index of the body's first particle
+    body: Array                 # (2, G) int 1; inner index of the first particle, column of `rest` of the first stick
     bucket: Array               # (G,) int 1; first bucket of the body's kind, for bodies untouched; that of particle p is p + 1 on
-    place: Array                # (G,) int 1; `first`, bucket by bucket
-    start: Array                # (D + 1,) int 1; bodies of bucket d are place[start[d]:start[d + 1]]
+    sorted: Array               # (2, G) int 1; `body`, bucket by bucket
+    start: Array                # (D + 1,) int 1; bodies of bucket d are columns start[d] to start[d + 1] of `sorted`
     stride: Array               # (D,) int 1; from one particle of a body to the next
     particles: Array            # (D,) int 1; of each body
     lanes: Array                # (D,) int 1; at most so many bodies are packed side by side
-    listed: Array               # (D + 1,) int 1; the list of bucket d is entry[listed[d]:listed[d + 1]]
-    entry: Array                # (E,) int 1; sticks of the lists
-    ends: Array                 # (2, S) int 1; particles of the body that each stick joins
-    rest: Array                 # (S,) real m
+    sticks: Array               # (2, D) int 1; first of the kind's columns in `ends` and `weight`, and one past the last
+    listed: Array               # (2, D) int 1; the bucket's list is entry[listed[0, d]:listed[1, d]]
+    entry: Array                # (E,) int 1; lists of sticks of a body
+    ends: Array                 # (2, S) int 1; particles of a body that each stick joins
     weight: Array               # (2, S) real 1; w_i / (w_i + w_j); both 0: a stick between pins
+    rest: Array                 # (V,) real m; of one body's sticks after the other's, once for bodies that are alike
     packed: Array               # (3, Q) real m; room for the particles of bodies side by side
+    lengths: Array              # (U,) real m; and for their rest lengths
 
 
 class Collided(NamedTuple):

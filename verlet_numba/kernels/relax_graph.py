@@ -2,7 +2,8 @@
 
 Bodies that are relaxed by the same list make a bucket. They are packed side by side, particle p of body k in lane k of
 row p, relaxed as one run for each entry of the list, and put back. Bodies share no particle, so the result of every
-body is bit for bit that of relaxing it alone, stick by stick.
+body is bit for bit that of relaxing it alone, stick by stick. Rest lengths are laid out likewise; for bodies that are
+alike once for all of them.
 
 Lanes are filled up to whole vectors with what is not a number: it is never off tolerance.
 """
@@ -24,16 +25,16 @@ def sort_bodies(graph, moved):
     """
     if graph is None:
         return
-    first, bucket, place, start = graph.first, graph.bucket, graph.place, graph.start
+    body, bucket, order, start = graph.body, graph.bucket, graph.sorted, graph.start
     start[:] = 0
-    for g in range(first.size):
+    for g in range(bucket.size):
         start[bucket[g] + moved[g] + 1] += 1
     for d in range(1, start.size):
         start[d] += start[d - 1]
-    for g in range(first.size - 1, -1, -1):
+    for g in range(bucket.size - 1, -1, -1):
         d = bucket[g] + moved[g] + 1
         start[d] -= 1
-        place[start[d]] = first[g]
+        order[0, start[d]], order[1, start[d]] = body[0, g], body[1, g]
 
 
 @kernel
@@ -41,20 +42,35 @@ def relax_graph(position, graph, tolerance, approximate):
     """Relax every rigid body once by its list. Returns the number of constraints relaxed: all, or those off tolerance."""
     if graph is None:
         return 0
-    _, _, place, start, stride, particles, lanes, listed, entry, ends, rest, weight, packed = graph
-    relaxed = 0
+    _, _, order, start, stride, particles, lanes, sticks, listed, entry, ends, weight, rest, packed, lengths = graph
+    relaxed, laid_out = 0, (-1, 0)
     for d in range(particles.size):
-        sticks = entry[listed[d]:listed[d + 1]]
+        kind = slice(sticks[0, d], sticks[1, d])
+        joins, shares, list_ = ends[:, kind], weight[:, kind], entry[listed[0, d]:listed[1, d]]
         for begin in range(start[d], start[d + 1], lanes[d]):
-            bodies = place[begin:min(begin + lanes[d], start[d + 1])]
-            width = -(-bodies.size // VECTOR) * VECTOR
-            pack(position, bodies, stride[d], particles[d], width, packed)
+            place, own = order[:, begin:min(begin + lanes[d], start[d + 1])]
+            width = -(-place.size // VECTOR) * VECTOR
+            pack(position, place, stride[d], particles[d], width, packed)
+            wanted = (own[0] if own.min() == own.max() else -1, width)
+            if wanted != laid_out or wanted[0] < 0:
+                lay_out(rest, own, shares.shape[1], width, lengths)
+                laid_out = wanted
             if tolerance is None:
-                relaxed += bodies.size * relax_list(packed, width, sticks, ends, rest, weight, approximate)
+                relaxed += place.size * relax_list(packed, lengths, width, list_, joins, shares, approximate)
             else:
-                relaxed += relax_tolerant_list(packed, width, sticks, ends, rest, weight, tolerance, approximate)
-            unpack(position, bodies, stride[d], particles[d], width, packed)
+                relaxed += relax_tolerant_list(packed, lengths, width, list_, joins, shares, tolerance, approximate)
+            unpack(position, place, stride[d], particles[d], width, packed)
     return relaxed
+
+
+@kernel
+def lay_out(rest, own, sticks, width, lengths):
+    """Rest lengths of bodies, whose first stand at own (N,), into lanes; lanes without a body take the first body's."""
+    for c in range(sticks):
+        row = lengths[c * width:(c + 1) * width]
+        for k in range(own.size):
+            row[k] = rest[own[k] + c]
+        row[own.size:] = row[0]
 
 
 @kernel
@@ -79,13 +95,13 @@ def unpack(position, place, stride, particles, width, packed):
 
 
 @kernel
-def relax_list(packed, width, sticks, ends, rest, weight, approximate):
+def relax_list(packed, lengths, width, sticks, ends, weight, approximate):
     """Relax the lanes by a list of sticks, one run an entry. Returns the number of constraints relaxed in each lane."""
     x, y, z = packed[0], packed[1], packed[2]
     zero, tiny = packed.dtype.type(0), np.finfo(packed.dtype).tiny
     relaxed = 0
     for c in sticks:
-        length, gi, gj = rest[c], weight[0, c], weight[1, c]
+        gi, gj, rest = weight[0, c], weight[1, c], lengths[c * width:(c + 1) * width]
         if gi + gj == zero:
             continue
         relaxed += 1
@@ -93,7 +109,7 @@ def relax_list(packed, width, sticks, ends, rest, weight, approximate):
         xi, yi, zi, xj, yj, zj = x[i:i + width], y[i:i + width], z[i:i + width], x[j:j + width], y[j:j + width], z[j:j + width]
         for k in range(width):
             dx, dy, dz = xj[k] - xi[k], yj[k] - yi[k], zj[k] - zi[k]
-            f = returned(dx * dx + dy * dy + dz * dz + tiny, length, approximate)
+            f = returned(dx * dx + dy * dy + dz * dz + tiny, rest[k], approximate)
             fi, fj = f * gi, f * gj
             xi[k] += fi * dx
             yi[k] += fi * dy
@@ -105,7 +121,7 @@ def relax_list(packed, width, sticks, ends, rest, weight, approximate):
 
 
 @kernel
-def relax_tolerant_list(packed, width, sticks, ends, rest, weight, tolerance, approximate):
+def relax_tolerant_list(packed, lengths, width, sticks, ends, weight, tolerance, approximate):
     """The same, leaving alone what is within the relative tolerance (paper, 7). Returns the number relaxed in all lanes.
 
     Counting comes first: where no lane is off, and in later passes that is often, nothing else is to do.
@@ -114,7 +130,7 @@ def relax_tolerant_list(packed, width, sticks, ends, rest, weight, tolerance, ap
     zero, slack, tiny = packed.dtype.type(0), packed.dtype.type(tolerance), np.finfo(packed.dtype).tiny
     relaxed = 0
     for c in sticks:
-        length, gi, gj = rest[c], weight[0, c], weight[1, c]
+        gi, gj, rest = weight[0, c], weight[1, c], lengths[c * width:(c + 1) * width]
         if gi + gj == zero:
             continue
         i, j = ends[0, c] * width, ends[1, c] * width
@@ -122,14 +138,14 @@ def relax_tolerant_list(packed, width, sticks, ends, rest, weight, tolerance, ap
         off = 0
         for k in range(width):
             dx, dy, dz = xj[k] - xi[k], yj[k] - yi[k], zj[k] - zi[k]
-            off += deviates(dx * dx + dy * dy + dz * dz + tiny, length, slack)
+            off += deviates(dx * dx + dy * dy + dz * dz + tiny, rest[k], slack)
         if off == 0:
             continue
         relaxed += off
         for k in range(width):
             dx, dy, dz = xj[k] - xi[k], yj[k] - yi[k], zj[k] - zi[k]
             squared = dx * dx + dy * dy + dz * dz + tiny
-            f = returned(squared, length, approximate) if deviates(squared, length, slack) else zero
+            f = returned(squared, rest[k], approximate) if deviates(squared, rest[k], slack) else zero
             fi, fj = f * gi, f * gj
             xi[k] += fi * dx
             yi[k] += fi * dy

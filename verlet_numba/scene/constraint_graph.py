@@ -24,6 +24,7 @@ REPEATS: dict[str, Callable[[int, int], int]] = {
 PACKED_BYTES = 24_576       # bodies side by side fill three quarters of a first-level cache of 32 KiB
 LANES = 16                  # in whole multiples of this
 MOST_LANES = 128
+Key = tuple[int, bytes, bytes]
 
 
 def levels(sticks: Integers, particle: int) -> list[list[int]]:
@@ -60,25 +61,25 @@ def lists(shape: Shape, repeats: str) -> list[Integers]:
     return [np.arange(len(shape.sticks)), *(constraint_list(shape.sticks, v, repeats) for v in range(len(shape.positions)))]
 
 
-def lanes_of(particles: int, itemsize: int) -> int:
-    """Bodies that are packed side by side."""
-    fit = PACKED_BYTES // (3 * particles * itemsize)
+def lanes_of(shape: Shape, itemsize: int) -> int:
+    """Bodies that are packed side by side: as many as fit the cache with positions and rest lengths."""
+    fit = PACKED_BYTES // (itemsize * (3 * len(shape.positions) + len(shape.sticks)))
     return min(max(fit // LANES, 1) * LANES, MOST_LANES)
 
 
 class Kind(NamedTuple):
-    """Bodies that share topology, rest lengths, masses and stride, so that lists relax them side by side."""
+    """Bodies that share topology, weights and stride, so that lists relax them side by side."""
 
-    shape: Shape
+    shape: Shape                # of one of them
     stride: int
     weight: Floats              # (2, C)
 
 
-def kind_of(shape: Shape, index: Integers, inverse_mass: Floats) -> tuple[tuple[bytes | int, ...], Kind]:
+def kind_of(shape: Shape, index: Integers, inverse_mass: Floats) -> tuple[Key, Kind]:
     """The kind of a body whose copies have the inner indices (K, P), and a key that tells kinds apart."""
     weight, _ = weights(plain(shape.sticks.T, shape.lengths, 0.0), inverse_mass[index[0]], 1.0)
     stride = int(index[0, 1] - index[0, 0])
-    return (stride, shape.sticks.tobytes(), shape.lengths.tobytes(), weight.tobytes()), Kind(shape, stride, weight)
+    return (stride, shape.sticks.tobytes(), weight.tobytes()), Kind(shape, stride, weight)
 
 
 def graph_of(bodies: list[Body], numbering: Numbering, inverse_mass: Floats, repeats: str, real: Any) -> Graph | None:
@@ -87,34 +88,46 @@ def graph_of(bodies: list[Body], numbering: Numbering, inverse_mass: Floats, rep
     inverse_mass: (n,) 1/kg; repeats: a key of REPEATS; real: dtype of the run. None without rigid bodies. Before any
     collision every body is in the bucket of its template's order. Lists take memory as particles times sticks of a kind.
     """
-    rigid = [(body.shape, index) for body, index in zip(bodies, numbering.bodies, strict=True) if body.shape.rigid]
-    if not rigid:
+    kinds: dict[Key, Kind] = {}
+    rests: dict[tuple[Key, bytes], Floats] = {}
+    first, kind, own = [], [], []
+    for body, index in zip(bodies, numbering.bodies, strict=True):
+        if body.shape.rigid:
+            key, found = kind_of(body.shape, index, inverse_mass)
+            alike = (key, body.shape.lengths.tobytes())
+            kinds.setdefault(key, found)
+            rests.setdefault(alike, body.shape.lengths)
+            first.append(index[:, 0])
+            kind.append(np.full(len(index), list(kinds).index(key)))
+            own.append(np.full(len(index), list(rests).index(alike)))
+    if not first:
         return None
-    kinds: dict[tuple[bytes | int, ...], Kind] = {}
-    first, kind = [], []
-    for shape, index in rigid:
-        key, found = kind_of(shape, index, inverse_mass)
-        kinds.setdefault(key, found)
-        first.append(index[:, 0])
-        kind.append(np.full(len(index), list(kinds).index(key)))
-    return assembled(list(kinds.values()), np.concatenate(first), np.concatenate(kind), repeats, np.dtype(real))
+    column = np.cumsum([0, *map(len, rests.values())])[np.concatenate(own)]
+    return assembled(list(kinds.values()), np.stack([np.concatenate(first), column]), np.concatenate(kind),
+                     np.concatenate(list(rests.values())), repeats, np.dtype(real))
 
 
-def assembled(kinds: list[Kind], first: Integers, kind: Integers, repeats: str, real: np.dtype[Any]) -> Graph:
-    """Buffers of bodies at `first` (G,), of these kinds (G,); every body in the bucket of its template's order."""
+def assembled(kinds: list[Kind], body: Integers, kind: Integers, rest: Floats, repeats: str, real: np.dtype[Any]) -> Graph:
+    """Buffers of bodies (2, G), as in Graph, of these kinds (G,), all in the buckets of their template's order."""
     ordered = {each.shape.sticks.tobytes(): each.shape for each in kinds}
-    listed = {topology: lists(shape, repeats) for topology, shape in ordered.items()}
+    listed: dict[bytes, Integers] = {}
+    entries: list[Integers] = []
+    for topology, shape in ordered.items():
+        found = lists(shape, repeats)
+        ends = sum(map(len, entries)) + np.cumsum([0, *map(len, found)])
+        listed[topology] = np.stack([ends[:-1], ends[1:]])
+        entries += found
     sticks = np.cumsum([0, *(len(each.shape.sticks) for each in kinds)])
-    entries = [base + part for each, base in zip(kinds, sticks, strict=False) for part in listed[each.shape.sticks.tobytes()]]
     size = np.array([len(each.shape.positions) for each in kinds])
-    lanes = np.array([lanes_of(particles, real.itemsize) for particles in size])
+    lanes = np.array([lanes_of(each.shape, real.itemsize) for each in kinds])
     buckets = size + 1
     bucket = (np.cumsum(buckets) - buckets)[kind]
-    bodies = np.bincount(bucket, minlength=buckets.sum())
-    per_bucket = [np.repeat(values, buckets) for values in ([each.stride for each in kinds], size, lanes)]
-    whole_numbers = [first, bucket, first[np.argsort(bucket, kind="stable")], np.cumsum([0, *bodies]), *per_bucket,
-                     np.cumsum([0, *map(len, entries)]), np.concatenate(entries),
+    start = np.cumsum([0, *np.bincount(bucket, minlength=buckets.sum())])
+    per_bucket = [np.repeat(values, buckets, axis=-1) for values in
+                  (np.array([each.stride for each in kinds]), size, lanes, np.stack([sticks[:-1], sticks[1:]]))]
+    whole_numbers = [body, bucket, body[:, np.argsort(bucket, kind="stable")], start, *per_bucket,
+                     np.concatenate([listed[each.shape.sticks.tobytes()] for each in kinds], axis=1), np.concatenate(entries),
                      np.concatenate([each.shape.sticks.T for each in kinds], axis=1)]
-    reals = [np.concatenate([each.shape.lengths for each in kinds]), np.concatenate([each.weight for each in kinds], axis=1),
-             np.zeros((3, padded(int((size * lanes).max()), real.itemsize)))]
+    room = np.zeros((3, padded(int((size * lanes).max()), real.itemsize)))
+    reals = [np.concatenate([each.weight for each in kinds], axis=1), rest, room, np.zeros(int((np.diff(sticks) * lanes).max()))]
     return Graph(*(gate(values, np.int64) for values in whole_numbers), *(gate(values, real) for values in reals))

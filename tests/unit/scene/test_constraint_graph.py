@@ -110,21 +110,34 @@ def test_buffers_of_several_kinds():
     numbering = number(bodies)
     graph = graph_of(bodies, numbering, inverse_masses(bodies, numbering), "by_level", "float32")
     rigid = [numbering.bodies[b] for b in (0, 2, 3, 4)]
-    np.testing.assert_array_equal(graph.first, np.concatenate([index[:, 0] for index in rigid]))
+    np.testing.assert_array_equal(graph.body[0], np.concatenate([index[:, 0] for index in rigid]))
+    np.testing.assert_array_equal(graph.body[1], [0, 0, 0, 36, 36, 72, 0, 0])
     np.testing.assert_array_equal(graph.bucket, [0, 0, 0, 13, 13, 26, 0, 0])
     np.testing.assert_array_equal(graph.particles, [12] * 26 + [8] * 9)
-    assert graph.start[-1] == len(graph.first) == 8
-    np.testing.assert_array_equal(graph.place[:5], graph.first[[0, 1, 2, 6, 7]])
-    assert graph.rest.dtype == graph.weight.dtype == graph.packed.dtype == np.float32
+    assert graph.start[-1] == 8
+    np.testing.assert_array_equal(graph.sorted[:, :5], graph.body[:, [0, 1, 2, 6, 7]])
+    assert graph.rest.dtype == graph.weight.dtype == graph.packed.dtype == graph.lengths.dtype == np.float32
     assert graph.packed.shape[1] >= (graph.particles * graph.lanes).max()
-    for bucket, base, shape, moved in ((0, 0, small, -1), (13 + 1 + 5, 36, large, 5), (26 + 1 + 7, 72, box, 7)):
+    assert graph.lengths.size >= ((graph.sticks[1] - graph.sticks[0]) * graph.lanes).max()
+    for bucket, body, shape, moved in ((0, 0, small, -1), (13 + 1 + 5, 3, large, 5), (26 + 1 + 7, 5, box, 7)):
         ordered = np.arange(len(shape.sticks)) if moved < 0 else constraint_list(shape.sticks, moved, "by_level")
-        found = graph.entry[graph.listed[bucket]:graph.listed[bucket + 1]]
-        np.testing.assert_array_equal(found, base + ordered)
-        np.testing.assert_array_equal(graph.ends[:, found], shape.sticks[ordered].T)
-        np.testing.assert_array_equal(graph.rest[found], shape.lengths[ordered].astype(np.float32))
+        np.testing.assert_array_equal(graph.entry[slice(*graph.listed[:, bucket])], ordered)
+        np.testing.assert_array_equal(graph.ends[:, slice(*graph.sticks[:, bucket])], shape.sticks.T)
+        rest = graph.rest[graph.body[1, body]:][:len(shape.sticks)]
+        np.testing.assert_array_equal(rest, shape.lengths.astype(np.float32))
     pinned = (graph.ends[:, 36:72] == 5).astype(float)
     np.testing.assert_allclose(graph.weight[:, 36:72], np.where(pinned.any(0), 1 - pinned, 0.5))
+
+
+def test_bodies_of_other_sizes_are_of_one_kind():
+    """They are relaxed side by side, each with its own rest lengths."""
+    sizes = [shapes.icosahedron(radius, mass=1 / radius) for radius in (0.1, 0.2, 0.3)]
+    bodies = bodies_of(*((shape, 2, []) for shape in sizes))
+    numbering = number(bodies)
+    graph = graph_of(bodies, numbering, inverse_masses(bodies, numbering), "once", "float64")
+    np.testing.assert_array_equal(graph.bucket, 0)
+    np.testing.assert_array_equal(graph.body[1], [0, 0, 36, 36, 72, 72])
+    np.testing.assert_array_equal(graph.rest, np.concatenate([shape.lengths for shape in sizes]))
 
 
 def test_no_rigid_body_has_no_graph():
