@@ -177,6 +177,8 @@ class Contacts(NamedTuple):
     bound: Array                # (L,) double m; normal . position must not be below it
     anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
     push: Array                 # (L,) double m; displacement along the normal given so far
+    kept: Array                 # (n,) double kg m; impulse of the last substep on a rigid body's particle
+    keeper: Array               # (n,) int 1; the collider that gave it
 
 
 class Rigid(NamedTuple):
@@ -214,7 +216,7 @@ class Touches(NamedTuple):
     label: Array                # (E,) int 1; number of the island by its root
     line: Array                 # (T, 12) double SI; normal from second to first, arms of first and second, slide since the start
     answer: Array               # (T, 5) double SI; wish [m], 1/response [kg], static and dynamic friction, separation to leave with [m]
-    given: Array                # (T, 6) double kg m; push, grip (3), kick along the normal, impact
+    given: Array                # (T, 5) double kg m; push, grip (3), kick along the normal
 
 
 class Hulls(NamedTuple):
@@ -245,7 +247,8 @@ class Pairs(NamedTuple):
     first: Array                # (M,) int 1
     second: Array               # (M,) int 1
     axis: Array                 # (3, M) double 1; separating axis of the last substep, which starts the next; 0: none
-    face: Array                 # (6, M) int 1; hit face of the last substep: corner numbers of the first hull, of the second; -1: none
+    face: Array                 # (6, M) int 1; hit face of the last substep: corners of the first hull, of the second; -1: none
+    push: Array                 # (M,) double kg m; impulse of the last substep between them
 
 
 class Search(NamedTuple):

@@ -16,7 +16,21 @@ from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
 from verlet_numba.effects.most_moved import choose_lists, remember
 from verlet_numba.effects.motion import carry, move
-from verlet_numba.effects.response import aim_colliders, aim_hulls, displace, kick_back, link, rebound, respond, shove
+from verlet_numba.effects.response import (
+    aim_colliders,
+    aim_hulls,
+    begin_pass,
+    displace,
+    keep_colliders,
+    keep_hulls,
+    kick_back,
+    link,
+    rebound,
+    recall_colliders,
+    recall_hulls,
+    respond,
+    shove,
+)
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.touch import HULLS, begin_touches, touch_colliders, touch_hulls, weigh
 from verlet_numba.effects.wind import blow
@@ -67,6 +81,8 @@ def advance(world, frames, budget):
             touch_hulls(meet, hulls, friction, rigid, touches, HULLS)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
+            recall_colliders(contact, rigid, touches)
+            recall_hulls(meet, rigid, touches, HULLS)
             begin_features(meet, features)
             forget(runs_softness)
             forget(sticks_softness)
@@ -79,6 +95,7 @@ def advance(world, frames, budget):
                 aim_colliders(position, contact, rigid, touches, h)
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, h)
                 respond(rigid, touches)
+                begin_pass(again, rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)
                 if not again:
@@ -88,6 +105,8 @@ def advance(world, frames, budget):
                 snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
                 snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
             bounce(position, previous, contact, restitution)
+            keep_colliders(contact, rigid, touches)
+            keep_hulls(meet, rigid, touches, HULLS)
             rebound(friction, rigid, touches)
             kick_back(position, previous, inverse_mass, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word

@@ -163,7 +163,82 @@ def link(rigid, touches):
         return
     touches.islands[0] = sort_islands(touches.first, touches.second, touches.until[-1], rigid.size.size - 1, rigid.parent,
                                       touches.label, touches.order, touches.island)
+
+
+@kernel
+def recall_colliders(contact, rigid, touches):
+    """What pushed in the last substep pushes now, to begin with: touches with colliders."""
+    if rigid is None:
+        return
     touches.given[:touches.until[-1]] = 0.0
+    if contact is None:
+        return
+    particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
+                                                    touches.source)
+    for t in range(touches.until[COLLIDERS]):
+        k = particle[source[t]]
+        if keeper[k] == solid[source[t]]:
+            given[t, 0] = kept[k]
+
+
+@kernel
+def recall_hulls(meet, rigid, touches, which):
+    """The same between hulls: the push of a pair is shared among its contacts, which stand side by side."""
+    if meet is None or rigid is None:
+        return
+    pair, source, given, push = meet.meetings.pair, touches.source, touches.given, meet.pairs.push
+    begin, end = touches.until[which - 1], touches.until[which]
+    while begin < end:
+        p, last = pair[source[begin]], begin + 1
+        while last < end and pair[source[last]] == p:
+            last += 1
+        for t in range(begin, last):
+            given[t, 0] = push[p] / (last - begin)
+        begin = last
+
+
+@kernel
+def keep_colliders(contact, rigid, touches):
+    """What the touches with colliders pushed in this substep is where the next begins."""
+    if contact is None or rigid is None:
+        return
+    particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
+                                                    touches.source)
+    push, w = contact.push, rigid.mass
+    for t in range(touches.until[COLLIDERS]):
+        kept[particle[source[t]]] = 0.0
+    for t in range(touches.until[COLLIDERS]):
+        c = source[t]
+        if given[t, 0] > kept[particle[c]]:
+            kept[particle[c]], keeper[particle[c]] = given[t, 0], solid[c]
+        push[c] = given[t, 0] * w[touches.first[t], 0]
+
+
+@kernel
+def keep_hulls(meet, rigid, touches, which):
+    """The same between hulls, pair by pair."""
+    if meet is None or rigid is None:
+        return
+    pair, source, given, push = meet.meetings.pair, touches.source, touches.given, meet.pairs.push
+    push[:meet.pairs.listed[0]] = 0.0
+    for t in range(touches.until[which - 1], touches.until[which]):
+        push[pair[source[t]]] += given[t, 0]
+
+
+@kernel
+def begin_pass(again, rigid, touches):
+    """Nothing has been given in this pass, but what the first one recalls."""
+    if rigid is None:
+        return
+    for i in range(rigid.touched[0]):
+        rigid.twist[rigid.order[i]] = 0.0
+    if again:
+        return
+    first, second, line, given, twist, mass = touches.first, touches.second, touches.line, touches.given, rigid.twist, rigid.mass
+    for t in range(touches.until[-1]):
+        j = given[t, 0]
+        if j > 0.0:
+            strike_both(twist, mass, first[t], second[t], line, t, j * line[t, 0], j * line[t, 1], j * line[t, 2])
 
 
 @kernel
@@ -192,8 +267,6 @@ def shove(friction, rigid, touches):
         return
     first, second, order, island = touches.first, touches.second, touches.order, touches.island
     line, answer, given, twist, mass = touches.line, touches.answer, touches.given, rigid.twist, rigid.mass
-    for i in range(rigid.touched[0]):
-        twist[rigid.order[i]] = 0.0
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
         for _ in range(sweeps_of(end - begin)):

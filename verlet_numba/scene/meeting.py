@@ -117,7 +117,7 @@ def real_(*shape: int) -> Array:
 
 def pairs_of(room: int) -> Pairs:
     """Room for so many pairs."""
-    return Pairs(whole(1), whole(room), whole(room), real_(3, room), whole(6, room))
+    return Pairs(whole(1), whole(room), whole(room), real_(3, room), whole(6, room), real_(room))
 
 
 def meetings_of(room: int) -> Meetings:
@@ -127,8 +127,8 @@ def meetings_of(room: int) -> Meetings:
 
 def search_of(hulls: int, room: int) -> Search:
     """The search for pairs among so many hulls, with room for so many pairs; no list has been made."""
-    return Search(whole(1), real_(3, hulls), real_(hulls), real_(3, hulls), real_(hulls), whole(hulls), whole(hulls), whole(hulls),
-                  real_(4, hulls), whole(4 * hulls + GRIDS * CELLS + 2), real_(GRIDS), whole(GRIDS + 1), whole(room))
+    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls), real_(GRIDS),
+                  whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4), whole(2 * hulls), whole(room))
 
 
 def narrow_of(hulls: Hulls) -> Narrow:

@@ -30,9 +30,10 @@ def rigid_of(bodies: list[Body], numbering: Numbering, size: int, particles: int
     reach = np.concatenate([np.zeros(0), *(np.full(len(index), reach_of(body)) for body, index in whole)])
     total = len(first)
     more = total + particles + 1            # a particle's entity is numbered after all that were touched before it
-    numbers = [np.concatenate([array, np.full(more, value)]) for array, value in ((first, 0), (stride, 1), (counts, 1))]
+    begin, by, many = (np.concatenate([array, np.full(more, value)]) for array, value in ((first, 0), (stride, 1), (counts, 1)))
     doubles = [gate(np.zeros((total + more, columns)), np.float64) for columns in (10, 6, 6, 6, 6)]
-    return Rigid(total, *(gate(array, np.int64) for array in numbers), gate(np.concatenate([reach, np.zeros(more)]), np.float64),
+    return Rigid(total, gate(begin, np.int64), gate(by, np.int64), gate(many, np.int64),
+                 gate(np.concatenate([reach, np.zeros(more)]), np.float64),
                  gate(np.full(size, -1), np.int64), gate(np.zeros(1), np.int64), gate(np.zeros(total + more), np.int64),
                  gate(np.full(total + more, -1), np.int64), *doubles)
 
@@ -46,4 +47,4 @@ def reach_of(body: Body) -> float:
 def touches_of(room: int, entities: int) -> Touches:
     """Room for so many touches between entities."""
     numbers = [gate(np.zeros(length), np.int64) for length in (3, 1, room, room, room, room, room + 1, entities)]
-    return Touches(*numbers, *(gate(np.zeros((room, columns)), np.float64) for columns in (12, 5, 6)))
+    return Touches(*numbers, *(gate(np.zeros((room, columns)), np.float64) for columns in (12, 5, 5)))
