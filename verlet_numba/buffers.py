@@ -179,6 +179,8 @@ class Contacts(NamedTuple):
     push: Array                 # (L,) double m; displacement along the normal given so far
     kept: Array                 # (n,) double kg m; impulse of the last substep on a rigid body's particle
     keeper: Array               # (n,) int 1; the collider that gave it
+    overlap: Array              # (n,) double m; of a rigid body's particle with colliders when they met, not yet given back
+    met: Array                  # (n,) int 1; substep in which it met one last
 
 
 class Rigid(NamedTuple):
@@ -249,6 +251,8 @@ class Pairs(NamedTuple):
     axis: Array                 # (3, M) double 1; separating axis of the last substep, which starts the next; 0: none
     face: Array                 # (6, M) int 1; hit face of the last substep: corners of the first hull, of the second; -1: none
     push: Array                 # (M,) double kg m; impulse of the last substep between them
+    overlap: Array              # (M,) double m; what they overlapped when they met, as far as it is not yet given back
+    met: Array                  # (M,) int 1; substep in which they met last
 
 
 class Search(NamedTuple):

@@ -92,8 +92,8 @@ def advance(world, frames, budget):
                 part_features(position, inverse_mass, meet, hulls, features)
                 if again:
                     gather(position, hulls)
-                aim_colliders(position, contact, rigid, touches, h)
-                aim_hulls(meet, hulls, contact, rigid, touches, HULLS, h)
+                aim_colliders(position, contact, rigid, touches, clock[NUMBER], h)
+                aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
                 respond(rigid, touches)
                 begin_pass(again, rigid, touches)
                 shove(friction, rigid, touches)

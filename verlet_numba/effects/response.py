@@ -21,17 +21,18 @@ SWEEPS = 16                 # over an island, at most
 FEW_SWEEPS = 4              # over an island of more touches than
 FEW_TOUCHES = 128           # these: what they leave, the next substep takes up
 SETTLED = 1e-7              # of the largest impulse: a sweep that changes less is the last
-RECOVERY = 2.5              # 1/s: an overlap that stood before leaves at this many sizes of the smaller body a second
+RECOVERY = 2.5              # 1/s: an overlap in which two meet is given back at this many sizes of the smaller a second
 
 
 @kernel
-def aim_colliders(position, contact, rigid, touches, h):
+def aim_colliders(position, contact, rigid, touches, number, h):
     """Lines and wishes of the touches with colliders."""
     if contact is None or rigid is None:
         return
     x, y, z = position[0], position[1], position[2]
     particle, normal, bound, anchor = contact.particle, contact.normal, contact.bound, contact.anchor
     first, source, mass, reach, line, answer = touches.first, touches.source, rigid.mass, rigid.reach, touches.line, touches.answer
+    overlap, met = contact.overlap, contact.met
     for t in range(touches.until[COLLIDERS]):
         c, e = source[t], first[t]
         k = particle[c]
@@ -42,19 +43,23 @@ def aim_colliders(position, contact, rigid, touches, h):
         line[t, 6] = line[t, 7] = line[t, 8] = 0.0
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
-        slack = math.inf if answer[t, 4] > 0.0 else RECOVERY * reach[e] * h
-        answer[t, 0] = wish(gap, nx * sx + ny * sy + nz * sz, slack)
+        standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
+        overlap[k] = still_given(overlap[k], met[k], number, standing, RECOVERY * reach[e] * h)
+        met[k] = number
+        answer[t, 0] = -gap - overlap[k]
 
 
 @inlined
-def wish(gap, approach, slack):
-    """How far a gap has to open [m]: all that this substep has closed, and of an overlap that stood before it only so much."""
-    standing = max(0.0, approach - gap)
-    return -gap - max(0.0, standing - slack)
+def still_given(overlap, met, number, standing, rate):
+    """What an overlap that two had when they met may still be, having shrunk by `rate` [m] a substep: 0 for all that met apart."""
+    left = standing
+    if met >= number - 1:
+        left = min(max(0.0, overlap - rate if met < number else overlap), standing)
+    return left
 
 
 @kernel
-def aim_hulls(meet, hulls, contact, rigid, touches, which, h):
+def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     """Lines and wishes of the touches between hulls, from the corners where they are."""
     if meet is None or rigid is None:
         return
@@ -63,7 +68,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, h):
     other, body, particle, start = meet.pairs.second, hulls.body, hulls.particle, hulls.start
     x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]
     first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
-    mass, step, moved, reach = rigid.mass, rigid.step, rigid.moved, rigid.reach
+    mass, step, moved, reach, overlap, met = rigid.mass, rigid.step, rigid.moved, rigid.reach, meet.pairs.overlap, meet.pairs.met
     world = reach.size - 1
     for t in range(touches.until[which - 1], touches.until[which]):
         m, a, b = source[t], first[t], second[t]
@@ -89,7 +94,11 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, h):
         line[t, 3], line[t, 4], line[t, 5] = px, py, pz
         line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
-        answer[t, 0] = wish(gap, nx * sx + ny * sy + nz * sz, RECOVERY * size * h)
+        p = pair[m]
+        standing = max(0.0, nx * sx + ny * sy + nz * sz - gap)
+        overlap[p] = still_given(overlap[p], met[p], number, standing, RECOVERY * size * h)
+        met[p] = number
+        answer[t, 0] = -gap - overlap[p]
 
 
 @inlined

@@ -17,6 +17,7 @@ import math
 from verlet_numba._jit import formula, kernel
 from verlet_numba.kernels import broad
 
+NEVER = -2              # Pairs.met before any substep
 KEPT, RENEWED, FULL = 0, 1, 2
 SLACK = 0.05                    # of the reach: for what rests, or moves otherwise than it did
 FASTER = 1.25                   # of the motion that the last substep foretells
@@ -89,20 +90,21 @@ def carry(centre, pairs, spare, before, listed):
     """Give the pairs listed in `spare` what they learnt in `pairs`: both ascend, so one walk along them finds all."""
     x, y, z = centre[0], centre[1], centre[2]
     old_first, old_second, old_axis, old_face = pairs.first, pairs.second, pairs.axis, pairs.face
-    first, second, axis, face, old_push, push = spare.first, spare.second, spare.axis, spare.face, pairs.push, spare.push
+    first, second, axis, face = spare.first, spare.second, spare.axis, spare.face
+    old_push, old_overlap, old_met, push, overlap, met = pairs.push, pairs.overlap, pairs.met, spare.push, spare.overlap, spare.met
     k = 0
     for m in range(listed):
         i, j = first[m], second[m]
         while k < before and (old_first[k] < i or (old_first[k] == i and old_second[k] < j)):
             k += 1
         if k < before and old_first[k] == i and old_second[k] == j:
-            push[m] = old_push[k]
+            push[m], overlap[m], met[m] = old_push[k], old_overlap[k], old_met[k]
             for row in range(3):
                 axis[row, m] = old_axis[row, k]
             for row in range(6):
                 face[row, m] = old_face[row, k]
         else:
-            push[m] = 0.0
+            push[m], overlap[m], met[m] = 0.0, 0.0, NEVER
             axis[0, m], axis[1, m], axis[2, m] = x[i] - x[j], y[i] - y[j], z[i] - z[j]
             for row in range(6):
                 face[row, m] = -1
@@ -115,6 +117,8 @@ def replace(pairs, spare, listed):
     copy(spare.first, pairs.first, listed)
     copy(spare.second, pairs.second, listed)
     copy(spare.push, pairs.push, listed)
+    copy(spare.overlap, pairs.overlap, listed)
+    copy(spare.met, pairs.met, listed)
     for row in range(3):
         copy(spare.axis[row], pairs.axis[row], listed)
     for row in range(6):

@@ -117,7 +117,7 @@ def real_(*shape: int) -> Array:
 
 def pairs_of(room: int) -> Pairs:
     """Room for so many pairs."""
-    return Pairs(whole(1), whole(room), whole(room), real_(3, room), whole(6, room), real_(room))
+    return Pairs(whole(1), whole(room), whole(room), real_(3, room), whole(6, room), real_(room), real_(room), whole(room))
 
 
 def meetings_of(room: int) -> Meetings:
