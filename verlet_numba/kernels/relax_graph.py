@@ -46,7 +46,7 @@ def relax_graph(position, graph, tolerance, approximate):
     relaxed, laid_out = 0, (-1, 0)
     for d in range(particles.size):
         kind = slice(sticks[0, d], sticks[1, d])
-        joins, shares, list_ = ends[:, kind], weight[:, kind], entry[listed[0, d]:listed[1, d]]
+        joins, shares, entries = ends[:, kind], weight[:, kind], entry[listed[0, d]:listed[1, d]]
         for begin in range(start[d], start[d + 1], lanes[d]):
             place, own = order[:, begin:min(begin + lanes[d], start[d + 1])]
             width = -(-place.size // VECTOR) * VECTOR
@@ -56,9 +56,9 @@ def relax_graph(position, graph, tolerance, approximate):
                 lay_out(rest, own, shares.shape[1], width, lengths)
                 laid_out = wanted
             if tolerance is None:
-                relaxed += place.size * relax_list(packed, lengths, width, list_, joins, shares, approximate)
+                relaxed += place.size * relax_list(packed, lengths, width, entries, joins, shares, approximate)
             else:
-                relaxed += relax_tolerant_list(packed, lengths, width, list_, joins, shares, tolerance, approximate)
+                relaxed += relax_tolerant_list(packed, lengths, width, entries, joins, shares, tolerance, approximate)
             unpack(position, place, stride[d], particles[d], width, packed)
     return relaxed
 

@@ -21,9 +21,9 @@ REPEATS: dict[str, Callable[[int, int], int]] = {
     "by_level": lambda n, k: -(-n // k), "halving": lambda n, k: -(-n // 2 ** (k - 1)), "once": lambda n, k: 1}
 """How often level k of n comes: n/k or n/2^(k-1), rounded up, or once."""
 
-PACKED_BYTES = 24_576       # bodies side by side fill three quarters of a first-level cache of 32 KiB
-LANES = 16                  # in whole multiples of this
-MOST_LANES = 128
+MOST_LANES = 96             # bodies side by side; 32 take up to half as long again, 192 save nothing
+LANES = 16                  # large bodies are fewer, but this many at least and in multiples of it
+PACKED_BYTES = 131_072      # that they fill: a quarter of a second-level cache
 Key = tuple[int, bytes, bytes]
 
 
@@ -62,7 +62,7 @@ def lists(shape: Shape, repeats: str) -> list[Integers]:
 
 
 def lanes_of(shape: Shape, itemsize: int) -> int:
-    """Bodies that are packed side by side: as many as fit the cache with positions and rest lengths."""
+    """Bodies that are packed side by side: as many as stay in the cache with positions and rest lengths."""
     fit = PACKED_BYTES // (itemsize * (3 * len(shape.positions) + len(shape.sticks)))
     return min(max(fit // LANES, 1) * LANES, MOST_LANES)
 
