@@ -216,9 +216,10 @@ class Touches(NamedTuple):
     order: Array                # (T,) int 1; touches island by island
     island: Array               # (T + 1,) int 1; where each island begins in `order`
     label: Array                # (E,) int 1; number of the island by its root
-    line: Array                 # (T, 12) double SI; normal from second to first, arms of first and second, slide since the start
-    answer: Array               # (T, 5) double SI; wish [m], 1/response [kg], static and dynamic friction, separation to leave with [m]
-    given: Array                # (T, 5) double kg m; push, grip (3), kick along the normal
+    line: Array                 # (T, 18) double SI; normal to the first, arms of both, slide so far, two directions across
+    answer: Array               # (T, 8) double SI; wish, 1/response, static and dynamic friction, separation to leave with,
+                                #                   inverse of the responses across (uu, uv, vv)
+    given: Array                # (T, 4) double kg m; push, grip in the two directions across, kick along the normal
 
 
 class Hulls(NamedTuple):

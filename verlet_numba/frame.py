@@ -94,7 +94,7 @@ def advance(world, frames, budget):
                     gather(position, hulls)
                 aim_colliders(position, contact, rigid, touches, clock[NUMBER], h)
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
-                respond(rigid, touches)
+                respond(friction, rigid, touches)
                 begin_pass(again, rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)

@@ -15,7 +15,7 @@ from verlet_numba.effects.touch import COLLIDERS
 from verlet_numba.kernels.islands import sort_islands
 from verlet_numba.physics.friction import held
 from verlet_numba.physics.pose import inward, outward, turn
-from verlet_numba.physics.rigid import cross, response, times_symmetric
+from verlet_numba.physics.rigid import across, cross, response, times_symmetric
 
 SWEEPS = 16                 # over an island, at most
 FEW_SWEEPS = 4              # over an island of more touches than
@@ -118,21 +118,35 @@ def shift_of(step, moved, e, rx, ry, rz):
 
 
 @kernel
-def respond(rigid, touches):
-    """How far the two entities of every touch give way to a unit impulse along its line."""
+def respond(friction, rigid, touches):
+    """How far the two entities of every touch give way to a unit impulse along its line, and across it."""
     if rigid is None:
         return
     first, second, line, answer, mass = touches.first, touches.second, touches.line, touches.answer, rigid.mass
     for t in range(touches.until[-1]):
-        given = along(mass, first[t], line[t, 3], line[t, 4], line[t, 5], line[t, 0], line[t, 1], line[t, 2])
-        given += along(mass, second[t], line[t, 6], line[t, 7], line[t, 8], line[t, 0], line[t, 1], line[t, 2])
-        answer[t, 1] = 1.0 / given if given > 0.0 else 0.0
+        a, b = first[t], second[t]
+        n, r, q = (line[t, 0], line[t, 1], line[t, 2]), (line[t, 3], line[t, 4], line[t, 5]), (line[t, 6], line[t, 7], line[t, 8])
+        one = (mass[a, 0], mass[a, 4], mass[a, 5], mass[a, 6], mass[a, 7], mass[a, 8], mass[a, 9])
+        other = (mass[b, 0], mass[b, 4], mass[b, 5], mass[b, 6], mass[b, 7], mass[b, 8], mass[b, 9])
+        along = response(r, n, n, one) + response(q, n, n, other)
+        answer[t, 1] = 1.0 / along if along > 0.0 else 0.0
+        respond_across(friction, line, answer, t, n, r, q, one, other)
 
 
-@inlined
-def along(mass, e, rx, ry, rz, nx, ny, nz):
-    """The response of entity e at the arm r along the unit vector n."""
-    return response(rx, ry, rz, nx, ny, nz, mass[e, 0], mass[e, 4], mass[e, 5], mass[e, 6], mass[e, 7], mass[e, 8], mass[e, 9])
+@kernel
+def respond_across(friction, line, answer, t, n, r, q, one, other):
+    """Two directions across the line of touch t, and the inverse of the matrix of responses to impulses along them."""
+    if friction is None:
+        return
+    u, v = across(*n)
+    uu = response(r, u, u, one) + response(q, u, u, other)
+    uv = response(r, u, v, one) + response(q, u, v, other)
+    vv = response(r, v, v, one) + response(q, v, v, other)
+    determinant = uu * vv - uv * uv
+    s = 1.0 / determinant if determinant > 0.0 else 0.0
+    for e in range(3):
+        line[t, 12 + e], line[t, 15 + e] = u[e], v[e]
+    answer[t, 5], answer[t, 6], answer[t, 7] = vv * s, -uv * s, uu * s
 
 
 @inlined
@@ -156,13 +170,6 @@ def strike(twist, mass, e, rx, ry, rz, jx, jy, jz):
     twist[e, 3] += ox
     twist[e, 4] += oy
     twist[e, 5] += oz
-
-
-@inlined
-def strike_both(twist, mass, a, b, line, t, jx, jy, jz):
-    """Give the impulse j of touch t to its first entity, and -j to the second."""
-    strike(twist, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
-    strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
 
 
 @kernel
@@ -247,7 +254,9 @@ def begin_pass(again, rigid, touches):
     for t in range(touches.until[-1]):
         j = given[t, 0]
         if j > 0.0:
-            strike_both(twist, mass, first[t], second[t], line, t, j * line[t, 0], j * line[t, 1], j * line[t, 2])
+            jx, jy, jz = j * line[t, 0], j * line[t, 1], j * line[t, 2]
+            strike(twist, mass, first[t], line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
+            strike(twist, mass, second[t], line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
 
 
 @kernel
@@ -288,41 +297,33 @@ def shove(friction, rigid, touches):
                 push = max(0.0, given[t, 0] + (answer[t, 0] - (nx * ux + ny * uy + nz * uz)) * answer[t, 1])
                 j = push - given[t, 0]
                 given[t, 0] = push
-                if j != 0.0:
-                    strike_both(twist, mass, a, b, line, t, j * nx, j * ny, j * nz)
-                j = max(abs(j), grip(friction, twist, mass, a, b, line, answer, given, t, push))
-                change, largest = max(change, j), max(largest, push)
+                gx, gy, gz = grip(friction, line, answer, given, t, push, ux, uy, uz)
+                jx, jy, jz = j * nx + gx, j * ny + gy, j * nz + gz
+                if jx != 0.0 or jy != 0.0 or jz != 0.0:
+                    strike(twist, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
+                    strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
+                    change = max(change, abs(jx), abs(jy), abs(jz))
+                largest = max(largest, push)
             if change <= SETTLED * largest:
                 break
 
 
 @kernel
-def grip(friction, twist, mass, a, b, line, answer, given, t, push):
-    """Take back the slide of touch t as far as friction holds. Returns the length of the impulse given."""
+def grip(friction, line, answer, given, t, push, ux, uy, uz):
+    """The impulse that takes back the slide of touch t as far as friction holds under so great a push; u: slide since aimed."""
     if friction is None:
-        return 0.0
-    gx, gy, gz = given[t, 1], given[t, 2], given[t, 3]
-    if push == 0.0 and gx == gy == gz == 0.0:
-        return 0.0
-    nx, ny, nz = line[t, 0], line[t, 1], line[t, 2]
-    ux, uy, uz = relative(twist, a, b, line, t)
+        return 0.0, 0.0, 0.0
+    px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
     sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
-    rise = nx * sx + ny * sy + nz * sz
-    sx, sy, sz = sx - rise * nx, sy - rise * ny, sz - rise * nz
-    slide = math.sqrt(sx * sx + sy * sy + sz * sz)
-    wx, wy, wz = gx, gy, gz
-    if slide > 0.0:
-        sx, sy, sz = sx / slide, sy / slide, sz / slide
-        yields = along(mass, a, line[t, 3], line[t, 4], line[t, 5], sx, sy, sz)
-        yields += along(mass, b, line[t, 6], line[t, 7], line[t, 8], sx, sy, sz)
-        back = slide / yields
-        wx, wy, wz = gx - back * sx, gy - back * sy, gz - back * sz
-    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    p, q = px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz
+    f = given[t, 1] - (answer[t, 5] * p + answer[t, 6] * q)
+    g = given[t, 2] - (answer[t, 6] * p + answer[t, 7] * q)
+    length = math.sqrt(f * f + g * g)
     share = held(length, push, answer[t, 2], answer[t, 3]) if length > 0.0 else 1.0
-    given[t, 1], given[t, 2], given[t, 3] = share * wx, share * wy, share * wz
-    jx, jy, jz = share * wx - gx, share * wy - gy, share * wz - gz
-    strike_both(twist, mass, a, b, line, t, jx, jy, jz)
-    return math.sqrt(jx * jx + jy * jy + jz * jz)
+    f, g = share * f, share * g
+    df, dg = f - given[t, 1], g - given[t, 2]
+    given[t, 1], given[t, 2] = f, g
+    return df * px + dg * qx, df * py + dg * qy, df * pz + dg * qz
 
 
 @kernel
@@ -381,13 +382,16 @@ def rebound(friction, rigid, touches):
                 sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
                 leaving = nx * sx + ny * sy + nz * sz
                 most = math.inf if answer[t, 4] > 0.0 else 0.0
-                total = min(most, max(-given[t, 0], given[t, 4] + (answer[t, 4] - leaving) * answer[t, 1]))
-                j = total - given[t, 4]
-                given[t, 4] = total
-                if j != 0.0:
-                    strike_both(kick, mass, a, b, line, t, j * nx, j * ny, j * nz)
+                total = min(most, max(-given[t, 0], given[t, 3] + (answer[t, 4] - leaving) * answer[t, 1]))
+                j = total - given[t, 3]
+                given[t, 3] = total
+                gx = gy = gz = 0.0
                 if total > 0.0:
-                    grip(friction, kick, mass, a, b, line, answer, given, t, given[t, 0] + total)
+                    gx, gy, gz = grip(friction, line, answer, given, t, given[t, 0] + total, ux, uy, uz)
+                jx, jy, jz = j * nx + gx, j * ny + gy, j * nz + gz
+                if jx != 0.0 or jy != 0.0 or jz != 0.0:
+                    strike(kick, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
+                    strike(kick, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
                 change, largest = max(change, abs(j)), max(largest, given[t, 0])
             if change <= SETTLED * largest:
                 break

@@ -7,6 +7,8 @@ are an axis, others hold it.
 
 import math
 
+import numpy as np
+
 from verlet_numba._jit import inlined, kernel
 from verlet_numba.effects.friction import coefficients
 from verlet_numba.physics.rigid import about_axis, cross, inverse_symmetric, times_symmetric
@@ -143,43 +145,66 @@ def weigh(position, previous, inverse_mass, rigid):
     for i in range(rigid.touched[0]):
         e = order[i]
         begin, by = first[e], stride[e]
-        end = begin + size[e] * by
-        weighed = weigh_one(x, y, z, inverse_mass, begin, end, by)
+        weighed = weigh_one(x, y, z, u, v, w, inverse_mass, begin, begin + size[e] * by, by)
         for column in range(10):
             mass[e, column] = weighed[column]
-        gone = step_of(x, y, z, u, v, w, inverse_mass, begin, end, by, weighed)
         for column in range(6):
-            step[e, column] = gone[column]
+            step[e, column] = weighed[10 + column]
             twist[e, column] = moved[e, column] = kick[e, column] = 0.0
 
 
 @kernel
-def weigh_one(x, y, z, inverse_mass, begin, end, by):
-    """1/mass, centre and inverse inertia of the particles begin, begin + by ... end; pins take freedom away."""
-    mass = cx = cy = cz = 0.0
-    pins, px, py, pz = 0, 0.0, 0.0, 0.0
+def weigh_one(x, y, z, u, v, w, inverse_mass, begin, end, by):
+    """1/mass, centre, inverse inertia and twist of the step of the particles begin, begin + by ... end, all of one mass.
+
+    Moments are summed about the first particle, then moved to the centre: I_c = I - M (d^2 1 - d d^T), L_c = L - M d x p.
+    """
+    free = 0.0
     for k in range(begin, end, by):
-        if inverse_mass[k] > 0:
-            m = 1.0 / inverse_mass[k]
-            mass, cx, cy, cz = mass + m, cx + m * x[k], cy + m * y[k], cz + m * z[k]
-        else:
-            pins, px, py, pz = pins + 1, px + x[k], py + y[k], pz + z[k]
-    if pins > 0:
-        cx, cy, cz = px / pins, py / pins, pz / pins
-    else:
-        cx, cy, cz = cx / mass, cy / mass, cz / mass
-    xx = yy = zz = xy = xz = yz = 0.0
+        free += inverse_mass[k] > 0
+    if free * by < end - begin:
+        return weigh_pinned(x, y, z, u, v, w, inverse_mass, begin, end, by)
+    ax, ay, az, m = np.float64(x[begin]), np.float64(y[begin]), np.float64(z[begin]), 1.0 / inverse_mass[begin]
+    sx = sy = sz = xx = yy = zz = xy = xz = yz = px = py = pz = lx = ly = lz = 0.0
+    for k in range(begin, end, by):
+        dx, dy, dz, gx, gy, gz = x[k] - ax, y[k] - ay, z[k] - az, x[k] - u[k], y[k] - v[k], z[k] - w[k]
+        sx, sy, sz, px, py, pz = sx + dx, sy + dy, sz + dz, px + gx, py + gy, pz + gz
+        xx, yy, zz, xy, xz, yz = xx + dx * dx, yy + dy * dy, zz + dz * dz, xy + dx * dy, xz + dx * dz, yz + dy * dz
+        lx, ly, lz = lx + (dy * gz - dz * gy), ly + (dz * gx - dx * gz), lz + (dx * gy - dy * gx)
+    one = 1.0 / free
+    cx, cy, cz = sx * one, sy * one, sz * one
+    xx, yy, zz, xy, xz, yz = xx - sx * cx, yy - sy * cy, zz - sz * cz, xy - sx * cy, xz - sx * cz, yz - sy * cz
+    lx, ly, lz = lx - (cy * pz - cz * py), ly - (cz * px - cx * pz), lz - (cx * py - cy * px)
+    inverse = inverse_symmetric(yy + zz, xx + zz, xx + yy, -xy, -xz, -yz)
+    ox, oy, oz = times_symmetric(inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5], lx, ly, lz)
+    w = 1.0 / m
+    return (w * one, ax + cx, ay + cy, az + cz, inverse[0] * w, inverse[1] * w, inverse[2] * w, inverse[3] * w, inverse[4] * w,
+            inverse[5] * w, px * one, py * one, pz * one, ox, oy, oz)
+
+
+@kernel
+def weigh_pinned(x, y, z, u, v, w, inverse_mass, begin, end, by):
+    """The same for a body with pins: it turns about them and goes where they go."""
+    pins = cx = cy = cz = px = py = pz = 0.0
+    for k in range(begin, end, by):
+        if not inverse_mass[k] > 0:
+            pins, cx, cy, cz = pins + 1.0, cx + x[k], cy + y[k], cz + z[k]
+            px, py, pz = px + (x[k] - u[k]), py + (y[k] - v[k]), pz + (z[k] - w[k])
+    cx, cy, cz, px, py, pz = cx / pins, cy / pins, cz / pins, px / pins, py / pins, pz / pins
+    xx = yy = zz = xy = xz = yz = lx = ly = lz = 0.0
     for k in range(begin, end, by):
         if inverse_mass[k] > 0:
             m, dx, dy, dz = 1.0 / inverse_mass[k], x[k] - cx, y[k] - cy, z[k] - cz
             xx, yy, zz = xx + m * (dy * dy + dz * dz), yy + m * (dx * dx + dz * dz), zz + m * (dx * dx + dy * dy)
             xy, xz, yz = xy - m * dx * dy, xz - m * dx * dz, yz - m * dy * dz
-    if pins == 0:
-        return 1.0 / mass, cx, cy, cz, *inverse_symmetric(xx, yy, zz, xy, xz, yz)
-    if pins == 1:
-        return 0.0, cx, cy, cz, *inverse_symmetric(xx, yy, zz, xy, xz, yz)
-    ax, ay, az = axis_of_pins(x, y, z, inverse_mass, begin, end, by, cx, cy, cz)
-    return 0.0, cx, cy, cz, *about_axis(xx, yy, zz, xy, xz, yz, ax, ay, az)
+            gx, gy, gz = cross(dx, dy, dz, x[k] - u[k] - px, y[k] - v[k] - py, z[k] - w[k] - pz)
+            lx, ly, lz = lx + m * gx, ly + m * gy, lz + m * gz
+    inverse = inverse_symmetric(xx, yy, zz, xy, xz, yz)
+    if pins > 1:
+        axis = axis_of_pins(x, y, z, inverse_mass, begin, end, by, cx, cy, cz)
+        inverse = about_axis(xx, yy, zz, xy, xz, yz, axis[0], axis[1], axis[2])
+    ox, oy, oz = times_symmetric(inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5], lx, ly, lz)
+    return (0.0, cx, cy, cz, inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5], px, py, pz, ox, oy, oz)
 
 
 @kernel
@@ -199,24 +224,3 @@ def axis_of_pins(x, y, z, inverse_mass, begin, end, by, cx, cy, cz):
     if length == 0.0:
         return 0.0, 0.0, 0.0
     return ax / length, ay / length, az / length
-
-
-@kernel
-def step_of(x, y, z, u, v, w, inverse_mass, begin, end, by, weighed):
-    """The twist that brought the particles from their previous places: momentum and angular momentum of the step, as displacements."""
-    inverse, cx, cy, cz = weighed[0], weighed[1], weighed[2], weighed[3]
-    mass = px = py = pz = 0.0
-    for k in range(begin, end, by):
-        pinned = not inverse_mass[k] > 0
-        if pinned == (inverse == 0.0):          # a body with pins goes where they go
-            m = 1.0 if pinned else 1.0 / inverse_mass[k]
-            mass, px, py, pz = mass + m, px + m * (x[k] - u[k]), py + m * (y[k] - v[k]), pz + m * (z[k] - w[k])
-    px, py, pz = px / mass, py / mass, pz / mass
-    lx = ly = lz = 0.0
-    for k in range(begin, end, by):
-        if inverse_mass[k] > 0:
-            m = 1.0 / inverse_mass[k]
-            dx, dy, dz = cross(x[k] - cx, y[k] - cy, z[k] - cz, x[k] - u[k] - px, y[k] - v[k] - py, z[k] - w[k] - pz)
-            lx, ly, lz = lx + m * dx, ly + m * dy, lz + m * dz
-    ox, oy, oz = times_symmetric(weighed[4], weighed[5], weighed[6], weighed[7], weighed[8], weighed[9], lx, ly, lz)
-    return px, py, pz, ox, oy, oz

@@ -4,6 +4,8 @@ An impulse j n at the arm r from the centre of mass displaces the body by the tr
 j I^-1 (r x n): its point at r moves along n by j (1/M + (r x n) . I^-1 (r x n)).
 """
 
+import math
+
 from verlet_numba._jit import formula
 
 
@@ -42,8 +44,21 @@ def about_axis(xx, yy, zz, xy, xz, yz, ax, ay, az):
 
 
 @formula
-def response(rx, ry, rz, nx, ny, nz, inverse_mass, xx, yy, zz, xy, xz, yz):
-    """Displacement along the unit vector n at the arm r of a unit impulse there."""
-    tx, ty, tz = cross(rx, ry, rz, nx, ny, nz)
-    ix, iy, iz = times_symmetric(xx, yy, zz, xy, xz, yz, tx, ty, tz)
-    return inverse_mass + tx * ix + ty * iy + tz * iz
+def response(r, u, v, answers):
+    """Displacement along the unit vector u at the arm r of a unit impulse along v there.
+
+    answers: 1/mass and the inverse inertia xx, yy, zz, xy, xz, yz.
+    """
+    px, py, pz = cross(r[0], r[1], r[2], u[0], u[1], u[2])
+    qx, qy, qz = cross(r[0], r[1], r[2], v[0], v[1], v[2])
+    ox, oy, oz = times_symmetric(answers[1], answers[2], answers[3], answers[4], answers[5], answers[6], qx, qy, qz)
+    return answers[0] * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) + px * ox + py * oy + pz * oz
+
+
+@formula
+def across(x, y, z):
+    """Two unit vectors across the unit vector (x, y, z) and each other (Duff et al. 2017)."""
+    s = math.copysign(1.0, z)
+    a = -1.0 / (s + z)
+    b = x * y * a
+    return (1.0 + s * x * x * a, s * b, -s * x), (b, s + y * y * a, -y)
