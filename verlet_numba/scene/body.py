@@ -30,6 +30,8 @@ class Shape:
     angle_values: Floats = field(default_factory=lambda: np.zeros(0))                # (A,) rad
     triangles: Integers = field(default_factory=lambda: np.zeros((0, 3), np.int64))  # (F, 3)
     lines: tuple[Integers, ...] = ()                                                 # polylines, for files and pictures
+    parts: tuple[Integers, ...] = ()                    # particles at the corners of each convex part; none: it is convex
+    notes: tuple[str, ...] = ()                         # what is to be said of the file it comes from
 
 
 @dataclass(frozen=True, eq=False)

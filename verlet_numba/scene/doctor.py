@@ -28,7 +28,7 @@ RESOLVED = 1e-3         # of the shortest stick: numbers further apart than this
 def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> list[Problem]:
     """Warnings about a scene and its placed bodies (`place`), each with its position in the file."""
     surfaces, _ = load_surfaces(scene, folder, source)
-    found = [*bracing(bodies), *sticks(bodies), *attachments(scene, bodies)]
+    found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies)]
     if scene.effects.contact != "none":
         found += [*inside_colliders(scene, bodies, surfaces), *too_fast(scene, bodies),
                   *too_coarse(scene, bodies),
@@ -37,16 +37,11 @@ def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> l
     return [source.problem(path, message) for path, message in found]
 
 
-def bracing(bodies: list[Body]) -> Warnings:
-    """Meshes whose tetrahedralisation left them floppy."""
+def meshes(bodies: list[Body]) -> Warnings:
+    """Meshes that repeat triangles, are not convex, or whose tetrahedralisation left them floppy."""
     for index, body in enumerate(bodies):
-        if body.shape.kind == "mesh":
-            from verlet_numba.scene.mesh import tetrahedral_sticks
-
-            added = len(body.shape.sticks) - len(tetrahedral_sticks(body.shape.positions, body.shape.triangles))
-            if added:
-                yield ("bodies", index, "file"), (f"the rank of the rigidity matrix falls short: the body is braced "
-                                                  f"by {added} sticks through its inside")
+        for note in body.shape.notes:
+            yield ("bodies", index, "file"), note
 
 
 def sticks(bodies: list[Body]) -> Warnings:

@@ -1,39 +1,56 @@
-"""Rigid bodies from files: a closed convex surface whose vertices become particles, held by a tetrahedralisation."""
+"""Rigid bodies from files: a closed surface whose vertices become particles, held by a tetrahedralisation."""
 
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from verlet_numba.scene import rigidity
 from verlet_numba.scene.body import Floats, Integers, Shape
+from verlet_numba.scene.clearance import hull_clearance
+from verlet_numba.scene.crossing import crossed
+from verlet_numba.scene.half_edge import SurfaceError, half_edges
+from verlet_numba.scene.hulls import hull_faces, is_convex, split, volume
 from verlet_numba.scene.shapes import ShapeError, edges, share_mass, stick_lengths
 
 FORMATS = (".obj", ".off", ".ply", ".stl")
 MERGE = 1e-7            # vertices closer than this part of the size are one
 FLAT = 1e-9             # a triangle whose height is below this part of its longest side has no area
 LARGEST = 1e9           # coordinate of a vertex, in the file's unit
-CONVEX = 1e-5           # how far, in parts of the size, a vertex may lie outside the plane of a triangle
 
 
 def mesh(file: Path, *, scale: float = 1.0, mass: float | None = None, density: float | None = None) -> Shape:
     """A rigid body from a triangle mesh, its vertices about the file's origin times `scale`; `density` in kg/m^3.
 
-    Particles are the vertices in the order of the file, equal ones merged. Sticks are the edges of the triangles and of
-    a Delaunay tetrahedralisation (P3 of the paper: all edges of a 3D triangulation).
-    Raises ShapeError, naming the triangle, for a surface that is not closed, consistently wound and convex.
+    The first particles are the vertices in the order of the file, equal ones merged. A surface that is not convex is
+    split into convex parts, whose new corners are particles after those. Sticks are the edges of the triangles and of a
+    tetrahedralisation (P3 of the paper), and where those leave the body floppy, braces.
+    Raises ShapeError, naming the triangle, for a surface that is not closed, consistently wound and free of crossings.
     """
-    positions, triangles = load(file)
+    positions, listed = load(file)
     positions = positions * scale
-    check_closed(positions, triangles)
-    triangles = outwards(positions, triangles)
-    check_convex(positions, triangles)
-    sticks = rigidity.brace(positions, tetrahedral_sticks(positions, triangles))
+    notes = []
+    kept = check_closed(positions, listed)
+    triangles = outwards(positions, listed[kept])
+    if len(repeated := np.setdiff1d(np.arange(len(listed)), kept)):
+        notes.append(f"triangle {repeated[0]} (counted from 0) is in the file twice: it counts once" + _others(repeated))
+    enclosed = volume(positions, triangles)
+    parts: tuple[Integers, ...] = ()
+    if not is_convex(positions, triangles):
+        _refuse_first(kept[crossed(positions, triangles)], positions, listed, "is crossed by another")
+        positions, parts = split(positions, triangles)
+        filled = sum(volume(positions[numbers], hull_faces(positions[numbers])) for numbers in parts)
+        notes.append(f"is not convex: it meets others as {len(parts)} convex parts, together of {filled / enclosed:.3g} "
+                     "times its volume")
+    tetrahedra = tetrahedral_sticks(positions, triangles, parts)
+    sticks = rigidity.brace(positions, tetrahedra)
+    if len(sticks) > len(tetrahedra):
+        notes.append("the rank of the rigidity matrix falls short: the body is braced by "
+                     f"{len(sticks) - len(tetrahedra)} sticks through its inside")
     if len(positions) <= rigidity.DENSE_LIMIT and not rigidity.is_rigid(positions, sticks):
         raise ShapeError("cannot be held rigid by sticks: it is too flat", "file")
-    return Shape("mesh", ("points",), positions,
-                 share_mass(len(positions), mass, density, volume(positions, triangles)),
-                 sticks, stick_lengths(positions, sticks), rigid=True, triangles=triangles)
+    return Shape("mesh", ("points",), positions, share_mass(len(positions), mass, density, enclosed),
+                 sticks, stick_lengths(positions, sticks), rigid=True, triangles=triangles, parts=parts,
+                 notes=tuple(notes))
 
 
 def load(file: Path) -> tuple[Floats, Integers]:
@@ -74,36 +91,41 @@ def _merged(positions: Floats, triangles: Integers) -> tuple[Floats, Integers]:
     return positions[first[order]], number[inverse.ravel()][corners].reshape(-1, 3)
 
 
-def check_closed(positions: Floats, triangles: Integers) -> None:
-    """Raises ShapeError unless triangles have areas, differ, and each side meets one other triangle the other way."""
+def check_closed(positions: Floats, triangles: Integers) -> Integers:
+    """The numbers of the triangles, in ascending order, the first of those that are repeated.
+
+    Raises ShapeError unless all have areas and together are closed, consistently wound surfaces.
+    """
     p, q, r = (positions[triangles[:, corner]] for corner in range(3))
     longest = np.max([np.linalg.norm(side, axis=1) for side in (q - p, r - q, p - r)], axis=0)
     height = np.linalg.norm(np.cross(q - p, r - p), axis=1)             # times the longest side
-    _refuse_first(height <= FLAT * longest**2, positions, triangles, "has no area: remove it")
-    _, same, count = np.unique(np.sort(triangles, axis=1), axis=0, return_inverse=True, return_counts=True)
-    _refuse_first(count[same.ravel()] > 1, positions, triangles, "is in the file twice: remove one")
-
-    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)        # (3 F, 2), directed
-    _, edge, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    shared = count[edge.ravel()].reshape(-1, 3)
-    _refuse_first((shared == 1).any(axis=1), positions, triangles, "has an open side: the surface must be closed")
-    _refuse_first((shared > 2).any(axis=1), positions, triangles, "has a side in common with more than one other")
-    _, way, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-    _refuse_first((count[way.ravel()] > 1).reshape(-1, 3).any(axis=1), positions, triangles,
-                  "is wound against its neighbour: turn it around")
-
-
-def _refuse_first(wrong: ArrayLike, positions: Floats, triangles: Integers, what: str) -> None:
-    if np.any(wrong):
-        face = int(np.flatnonzero(wrong)[0])
-        x, y, z = positions[triangles[face]].mean(axis=0)
-        raise ShapeError(f"triangle {face} (counted from 0, centre {x:.6g} {y:.6g} {z:.6g}) {what}", "file")
+    _refuse_first(np.flatnonzero(height <= FLAT * longest**2), positions, triangles, "has no area: remove it")
+    smallest_first = triangles[np.arange(len(triangles))[:, None], (triangles.argmin(axis=1)[:, None] + range(3)) % 3]
+    kept = np.sort(np.unique(smallest_first, axis=0, return_index=True)[1])
+    once = triangles[kept]
+    _, same, count = np.unique(np.sort(once, axis=1), axis=0, return_inverse=True, return_counts=True)
+    _refuse_first(kept[count[same.ravel()] > 1], positions, triangles, "is in the file twice, wound both ways: remove one")
+    try:
+        built = half_edges(once)
+    except SurfaceError as error:
+        raise _refusal(int(kept[error.face]), positions, triangles, str(error)) from error
+    _refuse_first(kept[built.face[built.twin < 0]], positions, triangles, "has an open side: the surface must be closed")
+    _refuse_first(kept[built.pinched()], positions, triangles, "has a corner where the surface meets itself in a point")
+    return kept
 
 
-def volume(positions: Floats, triangles: Integers) -> float:
-    """Volume inside a closed surface, by the divergence theorem: negative if its triangles point inwards."""
-    corners = positions[triangles] - positions.mean(axis=0)
-    return float(np.sum(np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6)
+def _refuse_first(wrong: Integers, positions: Floats, triangles: Integers, what: str) -> None:
+    if len(wrong):
+        raise _refusal(int(wrong[0]), positions, triangles, what)
+
+
+def _refusal(face: int, positions: Floats, triangles: Integers, what: str) -> ShapeError:
+    x, y, z = positions[triangles[face]].mean(axis=0)
+    return ShapeError(f"triangle {face} (counted from 0, centre {x:.6g} {y:.6g} {z:.6g}) {what}", "file")
+
+
+def _others(rows: Integers) -> str:
+    return f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
 
 
 def outwards(positions: Floats, triangles: Integers) -> Integers:
@@ -114,23 +136,11 @@ def outwards(positions: Floats, triangles: Integers) -> Integers:
     return triangles if enclosed > 0 else np.ascontiguousarray(triangles[:, ::-1])
 
 
-def check_convex(positions: Floats, triangles: Integers) -> None:
-    """Raises ShapeError unless all vertices lie behind the plane of every triangle, up to CONVEX times the size."""
-    p, q, r = (positions[triangles[:, corner]] for corner in range(3))
-    normal = np.cross(q - p, r - p)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    outside = np.empty(len(triangles))
-    chunk = max(1, 4_000_000 // len(positions))
-    for start in range(0, len(triangles), chunk):
-        part = slice(start, start + chunk)
-        outside[part] = (normal[part] @ positions.T).max(axis=1) - np.einsum("fi,fi->f", normal[part], p[part])
-    _refuse_first(outside > CONVEX * np.ptp(positions, axis=0).max(), positions, triangles,
-                  "lies in a dent: a body must be convex (make several convex bodies of it, or a collider)")
+def tetrahedral_sticks(positions: Floats, triangles: Integers, parts: tuple[Integers, ...] = ()) -> Integers:
+    """Edges (C, 2) of the surface and of a Delaunay tetrahedralisation of the particles, without flat tetrahedra.
 
-
-def tetrahedral_sticks(positions: Floats, triangles: Integers) -> Integers:
-    """Edges (C, 2) of the surface and of a Delaunay tetrahedralisation of its vertices, without flat tetrahedra.
-
+    Where the body consists of convex parts, only of tetrahedra whose centre lies in one: they need not fit the surface,
+    as sticks they hold the particles all the same, and each vertex of the file stays where it is.
     Where more than four points lie on a sphere, as in a cube, the tetrahedralisation is one of several, and may hold
     tetrahedra without volume, whose edges would cross within a face.
     """
@@ -144,5 +154,9 @@ def tetrahedral_sticks(positions: Floats, triangles: Integers) -> Integers:
     corners = unit[tetrahedra]
     six_volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     solid = tetrahedra[six_volumes > 1e-9 * six_volumes.sum()]
+    if parts:
+        centres = unit[solid].mean(axis=1)
+        within = [hull_clearance(unit[numbers], hull_faces(unit[numbers]), centres) <= 0 for numbers in parts]
+        solid = solid[np.any(within, axis=0)]
     pairs = [solid[:, [i, j]] for i in range(4) for j in range(i + 1, 4)]
     return np.unique(np.sort(np.concatenate([*pairs, edges(triangles)]), axis=1), axis=0)

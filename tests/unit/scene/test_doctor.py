@@ -192,7 +192,7 @@ def test_bracing_is_told(tmp_path, monkeypatch):
     from verlet_numba.scene import mesh
 
     full = mesh.tetrahedral_sticks
-    monkeypatch.setattr(mesh, "tetrahedral_sticks", lambda p, t: np.array([s for s in full(p, t) if s[0] > 0]))
+    monkeypatch.setattr(mesh, "tetrahedral_sticks", lambda *of: np.array([s for s in full(*of) if s[0] > 0]))
     trimesh.creation.icosphere(1).export(tmp_path / "ball.obj")
     assert paths("bodies: [{kind: mesh, file: ball.obj, mass: 1}]", "braced by 3 sticks", tmp_path) == ["bodies.0.file"]
 

@@ -1,0 +1,42 @@
+"""Whether a triangulated surface passes through itself."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verlet_numba.scene.body import Floats, Integers
+from verlet_numba.scene.shapes import edges
+
+FLAT = 1e-12            # of the cube of the size: a tetrahedron with less than a sixth of this volume is flat
+CHUNK = 2_000_000       # pairs of an edge and a triangle looked at together
+
+
+def crossed(positions: Floats, triangles: Integers) -> Integers:
+    """The triangles, in ascending order, that an edge of the surface passes through; touching is no crossing."""
+    unit = (positions - positions.mean(axis=0)) / np.ptp(positions, axis=0).max()
+    pairs = edges(triangles)
+    pairs = pairs[np.argsort(unit[pairs, 0].min(axis=1))]           # along x, so that a chunk meets few triangles
+    lower, upper = unit[triangles].min(axis=1), unit[triangles].max(axis=1)
+    chunk = max(1, min(256, CHUNK // len(triangles)))
+    found = [np.zeros(0, np.int64)]
+    for first in range(0, len(pairs), chunk):
+        some = pairs[first:first + chunk]
+        low, high = unit[some].min(axis=1), unit[some].max(axis=1)
+        near = np.flatnonzero(((lower <= high.max(axis=0)) & (upper >= low.min(axis=0))).all(axis=1))
+        e, t = np.nonzero(((low[:, None] <= upper[near]) & (high[:, None] >= lower[near])).all(axis=2))
+        apart = (some[e][:, :, None] != triangles[near[t]][:, None]).all(axis=(1, 2))
+        e, t = e[apart], near[t[apart]]
+        found.append(t[_passes(*np.moveaxis(unit[some[e]], 1, 0), *np.moveaxis(unit[triangles[t]], 1, 0))])
+    return np.unique(np.concatenate(found))
+
+
+def _passes(p: Floats, q: Floats, a: Floats, b: Floats, c: Floats) -> NDArray[np.bool_]:
+    """Whether segments pq cross triangles abc: p and q lie on either side, and pq turns the same way about all sides."""
+    either = _side(p, a, b, c) * _side(q, a, b, c)
+    turns = _side(p, q, a, b) + _side(p, q, b, c) + _side(p, q, c, a)
+    return np.asarray((either < 0) & (np.abs(turns) == 3))
+
+
+def _side(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
+    """Sign (N,) of the volume of tetrahedra abcd, 0 if they are flat."""
+    six_volumes = np.einsum("ni,ni->n", b - a, np.cross(c - a, d - a))
+    return np.where(np.abs(six_volumes) > FLAT, np.sign(six_volumes), 0.0)
