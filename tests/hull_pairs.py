@@ -11,7 +11,7 @@ def hulls_of(points, roundings=None, graphs=()):
     sizes = np.array([len(p) for p in points])
     padded = -(-sizes // 4) * 4
     start = np.concatenate([[0], np.cumsum(padded)])
-    corner = np.concatenate([np.concatenate([p, np.repeat(p[:1], n - len(p), axis=0)]) for p, n in zip(points, padded, strict=True)])
+    corner = np.concatenate([p[np.where(np.arange(n) < len(p), np.arange(n), 0)] for p, n in zip(points, padded, strict=True)])
     graph, ends, neighbour = np.full(len(points), -1), [0], []
     for h in graphs:
         around = [set() for _ in points[h]]

@@ -66,7 +66,7 @@ def known(label, n, i, j):
 
 @formula
 def upright(vertex, n, vx, vy, vz):
-    """v without what rounding left of it along the simplex: as a sum of vertices it has their error, which v may be small against."""
+    """v without what is left of it along the simplex: as a sum of vertices it has their rounding, against which it may be small."""
     if n == 1 or n == 4:
         return vx, vy, vz
     ux, uy, uz = vertex[0, 1] - vertex[0, 0], vertex[1, 1] - vertex[1, 0], vertex[2, 1] - vertex[2, 0]

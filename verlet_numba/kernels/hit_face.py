@@ -98,11 +98,13 @@ def drop_flat(vertex, label, weight, n, noise):
 @formula
 def remember(points, vertex, label, n, i, j):
     """The difference of columns i and j becomes vertex n."""
-    vertex[0, n], vertex[1, n], vertex[2, n], label[0, n], label[1, n] = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j], i, j
+    vertex[0, n], vertex[1, n], vertex[2, n] = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j]
+    label[0, n], label[1, n] = i, j
 
 
 @kernel
-def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight):
+def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
+            vertex, label, weight):
     """Add vertices to the simplex until it has four, or the difference no more dimensions. Returns how many it has."""
     n = drop_flat(vertex, label, weight, n, noise)
     while n < 4:
@@ -311,7 +313,8 @@ def hit_face(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_
     where it is a point or a line. Of the two sides of a plane, and of all directions across a line or from a point, a fixed one
     is taken.
     """
-    n = inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight)
+    n = inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
+                vertex, label, weight)
     if n == SOLID:
         f = expand(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
                    vertex, label, corner, across, plane, visible, horizon, stack)

@@ -28,7 +28,7 @@ def certify(first, second, found, slack=1e-12):
 
 
 def test_boxes_are_as_far_apart_as_their_faces():
-    status, _, v, _, _ = distance(box(1, 1, 1) + [0.1, 0.2, 3.0], box(2, 2, 2))
+    status, _, v, _, _ = distance(box(1, 1, 1) + np.array([0.1, 0.2, 3.0]), box(2, 2, 2))
     assert status == NEAR
     np.testing.assert_allclose(v, [0, 0, 1.5], atol=1e-15)
 
@@ -49,7 +49,7 @@ def test_distances_are_optimal_whatever_the_axis(scale):
 
 
 def test_an_axis_that_separates_by_more_than_the_bound_is_the_end():
-    first, second = box(1, 1, 1) + [3.0, 0.0, 0.0], box(1, 1, 1)
+    first, second = box(1, 1, 1) + np.array([3.0, 0.0, 0.0]), box(1, 1, 1)
     status, n, v, _, _ = distance(first, second, axis=[0.5, 0.2, 0.0], bound=1.4)
     assert (status, n) == (APART, 0)
     np.testing.assert_array_equal(v, [0.5, 0.2, 0.0])

@@ -35,7 +35,7 @@ def test_identical_bodies_in_one_pose(shape, scale):
     """B6: finite and deterministic, and as deep as they are thick."""
     points = {"box": box(1, 2, 3), "flat": box(1, 2, 0), "rod": box(1, 0, 0), "point": np.zeros((1, 3)),
               "heap": np.random.default_rng(0).normal(size=(30, 3))}[shape]
-    points = scale * rotated(points + [0.3, 0.2, 0.1], [1, 2, 3], 0.7)
+    points = scale * rotated(points + np.array([0.3, 0.2, 0.1]), [1, 2, 3], 0.7)
     normal, gap, p, q, _ = meet(points, points)
     assert np.isfinite([*normal, gap, *p, *q]).all()
     assert np.linalg.norm(normal) == pytest.approx(1, abs=1e-12)
@@ -54,8 +54,8 @@ def test_exact_touch_has_the_normal_of_the_face(scale, away):
         for slip in (0.0, 0.3):
             for error in (0.0, 1e-16, -1e-16, 3e-15, -3e-15):
                 second = rotated(box(1, 1, 1), [1, 1, 0], turn) + away
-                first = rotated(box(1, 1, 1) + [slip, 0.2 * slip, 1 + error], [1, 1, 0], turn) + away
-                normal, gap, p, q, carriers = meet(scale * first, scale * second)
+                first = rotated(box(1, 1, 1) + np.array([slip, 0.2 * slip, 1 + error]), [1, 1, 0], turn) + away
+                normal, gap, _, _, carriers = meet(scale * first, scale * second)
                 np.testing.assert_allclose(normal, rotated(np.array([[0, 0, 1.0]]), [1, 1, 0], turn)[0], atol=1e-12 * (1 + away))
                 assert abs(gap) <= 1e-14 * scale * (1 + away)
                 assert sum(carriers) <= 4
@@ -67,7 +67,7 @@ def test_a_pancake_that_is_grazed_gives_the_flat_face():
     tip = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.3], [-0.1, 0.1, 0.3], [-0.1, -0.1, 0.3]])
     for far in (0.0, 0.5, 0.9, 0.98):
         for depth in (1e-5, 1e-4, 4e-4):
-            normal, gap, p, _, carriers = meet(tip + [far, 0.0, 5e-4 - depth], pancake)
+            normal, gap, p, _, carriers = meet(tip + np.array([far, 0.0, 5e-4 - depth]), pancake)
             np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-9)
             assert gap == pytest.approx(-depth, rel=1e-9)
             np.testing.assert_allclose(p, [far, 0, 5e-4 - depth], atol=1e-12)
@@ -76,13 +76,13 @@ def test_a_pancake_that_is_grazed_gives_the_flat_face():
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6])
 def test_edges_that_turn_through_the_parallel_keep_their_normal(gap):
-    """B14: two nearly parallel edges that cross above each other have their normal straight up, to the root of rounding over the gap."""
+    """B14: nearly parallel edges that cross above each other: up, to the root of what rounding is of the gap."""
     roof = rotated(box(1, 1, 1), [1, 0, 0], np.pi / 4)
     angles = [0.0, *np.geomspace(1e-14, 1e-3, 23)]
     for sign in (1, -1):
         for angle in angles:
-            first = rotated(roof, [0, 0, 1], sign * angle) + [0.1, 0.0, np.sqrt(2) + gap]
-            normal, found, p, q, carriers = meet(first, roof)
+            first = rotated(roof, [0, 0, 1], sign * angle) + np.array([0.1, 0.0, np.sqrt(2) + gap])
+            normal, found, _, _, carriers = meet(first, roof)
             assert found == pytest.approx(gap, abs=1e-9)
             assert sum(carriers) <= 4
             np.testing.assert_allclose(normal, [0, 0, 1], atol=(1e-15 / gap) ** 0.5)
@@ -90,13 +90,13 @@ def test_edges_that_turn_through_the_parallel_keep_their_normal(gap):
 
 def test_flat_bodies_that_cross_and_rods_in_one_line():
     plate = box(1, 1, 0)
-    normal, gap, _, _, _ = meet(plate, rotated(plate, [0, 0, 1], 0.5) + [0.3, 0.2, 0.0])
+    normal, gap, _, _, _ = meet(plate, rotated(plate, [0, 0, 1], 0.5) + np.array([0.3, 0.2, 0.0]))
     np.testing.assert_allclose(np.abs(normal), [0, 0, 1], atol=1e-12)
     assert gap == pytest.approx(0, abs=1e-14)
-    normal, gap, p, q, _ = meet(box(1, 0, 0), box(1, 0, 0) + [0.5, 0.0, 0.0])
+    normal, gap, p, q, _ = meet(box(1, 0, 0), box(1, 0, 0) + np.array([0.5, 0.0, 0.0]))
     assert normal[0] == pytest.approx(0, abs=1e-12)
     np.testing.assert_allclose(p, q, atol=1e-12)
-    normal, gap, _, _, carriers = meet(box(1, 0, 0) + [0.1, 0.1, 0], box(0, 1, 0))
+    normal, gap, _, _, carriers = meet(box(1, 0, 0) + np.array([0.1, 0.1, 0]), box(0, 1, 0))
     np.testing.assert_allclose(np.abs(normal), [0, 0, 1], atol=1e-12)
     assert carriers == (2, 2)
 
