@@ -130,7 +130,7 @@ def test_what_is_beyond_the_margin_is_left_out_and_its_face_kept(crowd):
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_spheres_and_rounded_hulls(scale):
     point = np.zeros((1, 3))
-    normal, gap, p, q, _ = meet(scale * (point + [3.0, 4.0, 0.0]), scale * point, scale * np.array([1.0, 2.0]))
+    normal, gap, p, q, _ = meet(scale * (point + np.array([3.0, 4.0, 0.0])), scale * point, scale * np.array([1.0, 2.0]))
     np.testing.assert_allclose(normal, [0.6, 0.8, 0.0], atol=1e-15)
     assert gap == pytest.approx(2 * scale, rel=1e-14)
     np.testing.assert_allclose((p - q) @ normal, 5 * scale, rtol=1e-14)
@@ -143,7 +143,7 @@ def test_spheres_and_rounded_hulls(scale):
     assert gap == pytest.approx(-0.15 * scale, rel=1e-9)
     assert sum(carriers) <= 4
     assert meet(*bare, scale * np.array([0.05, 0.05]), margin=0.05 * scale) is None
-    sunk = scale * (point + [0.1, 0.2, 0.4]), scale * box(2, 2, 1)
+    sunk = scale * (point + np.array([0.1, 0.2, 0.4])), scale * box(2, 2, 1)
     normal, gap, _, _, carriers = meet(*sunk, scale * np.array([0.5, 0.0]))
     np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-12)
     assert gap == pytest.approx(-0.6 * scale, rel=1e-12)            # a sphere whose centre is 0.1 below the surface
