@@ -250,7 +250,7 @@ class Pairs(NamedTuple):
     first: Array                # (M,) int 1
     second: Array               # (M,) int 1
     axis: Array                 # (3, M) double 1; separating axis of the last substep, which starts the next; 0: none
-    face: Array                 # (6, M) int 1; hit face of the last substep: corners of the first hull, of the second; -1: none
+    face: Array                 # (6, M) int 1; hit face of the last substep: corner numbers, three of either hull; -1: none
     push: Array                 # (M,) double kg m; impulse of the last substep between them
     overlap: Array              # (M,) double m; what they overlapped when they met, as far as it is not yet given back
     met: Array                  # (M,) int 1; substep in which they met last
@@ -293,7 +293,7 @@ class Narrow(NamedTuple):
     label: Array                # (2, V) int 1; the columns of Hulls.corner that it is the difference of
     weight: Array               # (4,) double 1; of the simplex' vertices, the point nearest the origin
     corner: Array               # (3, F) int 1; vertices of a face of the polytope, counterclockwise from outside
-    across: Array               # (3, F) int 1; four times the face beyond its edge e (corner e to e + 1), plus the edge's number there
+    across: Array               # (3, F) int 1; 4 times the face beyond edge e (corner e to e + 1), plus its edge there
     plane: Array                # (4, F) double 1; outward normal and distance from the origin [m]; infinite: no area
     visible: Array              # (F,) int 1; faces that the new vertex sees
     horizon: Array              # (3F + 3,) int 1; edges around them, as in `across`

@@ -9,11 +9,12 @@ import numpy as np
 
 from verlet_numba._jit import formula, kernel
 from verlet_numba.kernels.support import support
-from verlet_numba.physics.simplex import segment, tetrahedron, triangle
+from verlet_numba.physics.simplex import cross, dot, segment, tetrahedron, triangle
 
 APART, NEAR, MET = 0, 1, 2
 ITERATIONS = 64
-RELATIVE = 1e-12        # error of a distance
+RELATIVE = 1e-15        # error of a distance; that of its direction is the root of it
+CLOSE = 1e-4            # square of a distance, of the farthest vertex' one, below which v is set upright before it is believed
 TOUCHING = 1e-30        # square of a distance, of the farthest vertex' one: rounding
 
 
@@ -63,6 +64,20 @@ def known(label, n, i, j):
     return found
 
 
+@formula
+def upright(vertex, n, vx, vy, vz):
+    """v without what is left of it along the simplex: as a sum of vertices it has their rounding, against which it may be small."""
+    if n == 1 or n == 4:
+        return vx, vy, vz
+    ux, uy, uz = vertex[0, 1] - vertex[0, 0], vertex[1, 1] - vertex[1, 0], vertex[2, 1] - vertex[2, 0]
+    if n == 2:
+        part = dot(ux, uy, uz, vx, vy, vz) / dot(ux, uy, uz, ux, uy, uz)
+        return vx - part * ux, vy - part * uy, vz - part * uz
+    nx, ny, nz = cross(ux, uy, uz, vertex[0, 2] - vertex[0, 0], vertex[1, 2] - vertex[1, 0], vertex[2, 2] - vertex[2, 0])
+    part = dot(nx, ny, nz, vx, vy, vz) / dot(nx, ny, nz, nx, ny, nz)
+    return part * nx, part * ny, part * nz
+
+
 @kernel
 def gjk(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, vx, vy, vz, bound,
         vertex, label, weight):
@@ -72,7 +87,7 @@ def gjk(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, si
     vertices in the simplex; v, from the second hull to the first: just a direction where they are APART, [m] where they are
     NEAR. Ends always: on the relative error, on a vertex that is known, where v gets no shorter, after 64 iterations.
     """
-    n, squared, farthest, i, j = 0, np.inf, 0.0, start_a, start_b
+    n, squared, farthest, i, j, erect = 0, np.inf, 0.0, start_a, start_b, False
     for _ in range(ITERATIONS):
         i = support(points, start_a, size_a, row_a, neighbours, neighbour, seen, i, -vx, -vy, -vz)
         j = support(points, start_b, size_b, row_b, neighbours, neighbour, seen, j, vx, vy, vz)
@@ -81,7 +96,11 @@ def gjk(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, si
         if along > 0.0 and along * along > bound * bound * (vx * vx + vy * vy + vz * vz):
             return APART, n, vx, vy, vz
         if n > 0 and (squared - along <= RELATIVE * squared or known(label, n, i, j)):
-            return NEAR, n, vx, vy, vz
+            if erect or squared > CLOSE * farthest:
+                return NEAR, n, vx, vy, vz
+            vx, vy, vz = upright(vertex, n, vx, vy, vz)
+            erect = True
+            continue
         vertex[0, n], vertex[1, n], vertex[2, n], label[0, n], label[1, n] = wx, wy, wz, i, j
         a, b, c, d = nearest(vertex, n + 1)
         if d > 0.0 and c > 0.0 and b > 0.0 and a > 0.0:
@@ -92,7 +111,7 @@ def gjk(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, si
         if shorter >= squared:
             return NEAR, n, vx, vy, vz
         n = keep(vertex, label, weight, a, b, c, d)
-        vx, vy, vz, squared = ux, uy, uz, shorter
+        vx, vy, vz, squared, erect = ux, uy, uz, shorter, False
         farthest = max(farthest, wx * wx + wy * wy + wz * wz)
         if squared <= TOUCHING * farthest:
             return MET, n, vx, vy, vz

@@ -98,11 +98,13 @@ def drop_flat(vertex, label, weight, n, noise):
 @formula
 def remember(points, vertex, label, n, i, j):
     """The difference of columns i and j becomes vertex n."""
-    vertex[0, n], vertex[1, n], vertex[2, n], label[0, n], label[1, n] = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j], i, j
+    vertex[0, n], vertex[1, n], vertex[2, n] = points[0, i] - points[0, j], points[1, i] - points[1, j], points[2, i] - points[2, j]
+    label[0, n], label[1, n] = i, j
 
 
 @kernel
-def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight):
+def inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
+            vertex, label, weight):
     """Add vertices to the simplex until it has four, or the difference no more dimensions. Returns how many it has."""
     n = drop_flat(vertex, label, weight, n, noise)
     while n < 4:
@@ -203,16 +205,14 @@ def silhouette(vertex, across, plane, visible, horizon, stack, noise, f, w):
 
 
 @formula
-def ring(corner, horizon, seen, edges):
-    """Whether the horizon is one closed ring about the faces seen, as it is on a sphere but for rounding."""
-    if edges != seen + 2:
-        return False
+def ring(corner, horizon, edges):
+    """Whether the horizon is one closed ring about the faces seen, as it is but for rounding."""
     for k in range(edges):
         g, e = ends(horizon[k])
         h, d = ends(horizon[following(k, edges)])
         if corner[e, g] != corner[following(d, 3), h]:
             return False
-    return True
+    return edges >= 3
 
 
 @formula
@@ -223,7 +223,10 @@ def slot(visible, seen, faces, k):
 
 @formula
 def cone(vertex, corner, across, plane, visible, horizon, noise, seen, edges, faces, w):
-    """The faces between the horizon and vertex w take the place of those that it sees."""
+    """The faces between the horizon and vertex w take the place of those that it sees. Returns how many places are in use.
+
+    There are two more of them, unless vertices have gone too: a place that is left over stays behind as a face without area.
+    """
     before, f = slot(visible, seen, faces, edges - 1), slot(visible, seen, faces, 0)
     for k in range(edges):
         g, e = ends(horizon[k])
@@ -232,6 +235,9 @@ def cone(vertex, corner, across, plane, visible, horizon, noise, seen, edges, fa
         place(vertex, corner, across, plane, noise, f, corner[following(e, 3), g], corner[e, g], w,
               horizon[k], edge(after, 2), edge(before, 1))
         before, f = f, after
+    for k in range(edges, seen):
+        plane[3, visible[k]] = np.inf
+    return max(faces, faces + edges - seen)
 
 
 @formula
@@ -254,14 +260,17 @@ def corners_of(vertex, corner, f):
 
 @kernel
 def pierced(vertex, corner, plane, faces, f, noise):
-    """Of the faces as near the origin as f, the one that its projection falls into: several may lie in one plane."""
+    """Of the faces in the plane of f, the one that the origin's projection falls into, or comes nearest to."""
     u, v, w, _, _, _ = areas(*corners_of(vertex, corner, f))
     if u > 0.0 and v > 0.0 and w > 0.0:
         return f
-    best, chosen, limit = np.inf, f, plane[3, f] + noise
+    _, _, _, best = side(*corners_of(vertex, corner, f))
+    chosen, nx, ny, nz, distance = f, plane[0, f], plane[1, f], plane[2, f], plane[3, f]
     for g in range(faces):
-        if plane[3, g] <= limit:
-            _, _, _, found = side(*corners_of(vertex, corner, g))
+        ax, ay, az, bx, by, bz, cx, cy, cz = corners_of(vertex, corner, g)
+        deepest = min(min(dot(nx, ny, nz, ax, ay, az), dot(nx, ny, nz, bx, by, bz)), dot(nx, ny, nz, cx, cy, cz))
+        if plane[3, g] < np.inf and deepest >= distance - noise:
+            _, _, _, found = side(ax, ay, az, bx, by, bz, cx, cy, cz)
             if found < best:
                 best, chosen = found, g
     return chosen
@@ -283,14 +292,14 @@ def expand(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b,
         if dot(nx, ny, nz, vertex[0, n], vertex[1, n], vertex[2, n]) - distance <= noise or known(label, n, i, j):
             break
         gone, edges = silhouette(vertex, across, plane, visible, horizon, stack, noise, f, n)
-        if not ring(corner, horizon, gone, edges):
+        if not ring(corner, horizon, edges):
             for k in range(gone):       # the polytope is as good as rounding allows
                 g = visible[k]
                 place(vertex, corner, across, plane, noise, g, corner[0, g], corner[1, g], corner[2, g],
                       across[0, g], across[1, g], across[2, g])
             break
-        cone(vertex, corner, across, plane, visible, horizon, noise, gone, edges, faces, n)
-        n, faces = n + 1, faces + edges - gone
+        faces = cone(vertex, corner, across, plane, visible, horizon, noise, gone, edges, faces, n)
+        n += 1
         f = lowest(plane, faces)
     return pierced(vertex, corner, plane, faces, f, noise)
 
@@ -304,7 +313,8 @@ def hit_face(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_
     where it is a point or a line. Of the two sides of a plane, and of all directions across a line or from a point, a fixed one
     is taken.
     """
-    n = inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n, vertex, label, weight)
+    n = inflate(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise, n,
+                vertex, label, weight)
     if n == SOLID:
         f = expand(points, neighbours, neighbour, seen, start_a, size_a, row_a, start_b, size_b, row_b, noise,
                    vertex, label, corner, across, plane, visible, horizon, stack)

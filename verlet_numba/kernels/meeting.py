@@ -29,8 +29,9 @@ def merged(p, q, r, u, v, w):
 @formula
 def holds(a, b, c, d, e, f, u, v, w):
     """Whether the weighted vertices are points of the hulls, as they are everywhere in the parallelogram of two edges."""
-    u, v, w, s, t, r = *merged(a, b, c, u, v, w), *merged(d, e, f, u, v, w)
-    return min(min(min(u, v), w), min(min(s, t), r)) >= -INSIDE
+    ua, va, wa = merged(a, b, c, u, v, w)
+    ub, vb, wb = merged(d, e, f, u, v, w)
+    return min(min(min(ua, va), wa), min(min(ub, vb), wb)) >= -INSIDE
 
 
 @formula
@@ -58,7 +59,7 @@ def along_edge(points, corner, weight, t, first):
 
 @formula
 def rates(points, corner, t, first, tx, ty, tz):
-    """How the weights of three corners change as their point moves by t: p's by n . (t x (q - r)) / n . n; 0 for a flat triangle."""
+    """How the weights of three corners change as their point moves by t: p's by n . (t x (q - r)) / n . n; 0 where flat."""
     i, j, k = corner[first, t], corner[first + 1, t], corner[first + 2, t]
     ux, uy, uz = points[0, j] - points[0, i], points[1, j] - points[1, i], points[2, j] - points[2, i]
     wx, wy, wz = points[0, k] - points[0, i], points[1, k] - points[1, i], points[2, k] - points[2, i]

@@ -21,7 +21,7 @@ ROUNDING = 1e-14        # of a hull's reach and its centre's coordinates: differ
 TOUCHING = 1e4          # such differences: a distance that gives no normal
 POLYTOPE = 128          # vertices of a hulls' difference that the search for a hit face may use
 
-HELD, LOST, AWAY = 0, 1, 2
+KEPT, AWAY, LOST, ELSEWHERE = 0, 1, 2, 3        # what became of what a pair learnt
 
 
 def scratch(hulls: Hulls) -> Narrow:
@@ -61,20 +61,23 @@ def gather_hulls(position, hulls):
 def feature(points, a, b, c, d, e, f):
     """The face, edge or vertex of the difference with the vertices a - d, b - e, c - f, the last repeated where there are fewer.
 
-    Returns its normal, away from the hulls' overlap or towards the origin, its distance along it, and the weights of the origin's
-    projection; some may be negative. An edge through the origin has no normal: NaN.
+    Returns its unit normal (of an edge or a vertex: towards the origin), the distance along it, and the weights of the origin's
+    projection; some may be negative. What has no normal has 0, and weights that are none.
     """
     px, py, pz, qx, qy, qz = (points[0, a] - points[0, d], points[1, a] - points[1, d], points[2, a] - points[2, d],
                               points[0, b] - points[0, e], points[1, b] - points[1, e], points[2, b] - points[2, e])
     if b == c and e == f:
         u, v = segment(px, py, pz, qx, qy, qz)
         px, py, pz = u * px + v * qx, u * py + v * qy, u * pz + v * qz
-        length = np.sqrt(dot(px, py, pz, px, py, pz))
-        return -px / length, -py / length, -pz / length, -length, u, v, 0.0
-    u, v, w, nx, ny, nz = areas(px, py, pz, qx, qy, qz,
-                                points[0, c] - points[0, f], points[1, c] - points[1, f], points[2, c] - points[2, f])
-    whole = dot(nx, ny, nz, nx, ny, nz)
-    length = np.sqrt(whole)
+        length, w, whole = np.sqrt(dot(px, py, pz, px, py, pz)), 0.0, 1.0
+        nx, ny, nz = -px, -py, -pz
+    else:
+        u, v, w, nx, ny, nz = areas(px, py, pz, qx, qy, qz,
+                                    points[0, c] - points[0, f], points[1, c] - points[1, f], points[2, c] - points[2, f])
+        whole = dot(nx, ny, nz, nx, ny, nz)
+        length = np.sqrt(whole)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0, 0.0, -1.0, -1.0, -1.0
     nx, ny, nz = nx / length, ny / length, nz / length
     return nx, ny, nz, dot(nx, ny, nz, px, py, pz), u / whole, v / whole, w / whole
 
@@ -106,7 +109,7 @@ def clamped(vertex, p, q, r, nx, ny, nz):
 @kernel
 def met(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
         vertex, label, weight, corner, across, plane, visible, horizon, stack):
-    """The hit face from a simplex of n vertices: whether it is a face, its six columns, and as `feature`, with weights of its own."""
+    """The hit face from a simplex of n vertices: whether it is a face, its six columns, and as `feature`, its weights holding."""
     kind, nx, ny, nz, p, q, r = hit_face(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
                                          vertex, label, weight, corner, across, plane, visible, horizon, stack)
     a, b, c, d, e, f = label[0, p], label[0, q], label[0, r], label[1, p], label[1, q], label[1, r]
@@ -119,6 +122,45 @@ def met(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
 
 
 @kernel
+def recall(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, bound, face, i, vertex, label):
+    """What pair i learnt: what became of it, its six columns, and as `feature`.
+
+    KEPT: it is the contact. AWAY: its normal separates the hulls by more than `bound` [m]. LOST: a face that is no longer the
+    nearest; it and the vertex opposite to it are now the first four vertices. ELSEWHERE: the hulls may be apart, and its normal is
+    where to begin.
+    """
+    a, b, c = sa + face[0, i], sa + face[1, i], sa + face[2, i]
+    d, e, f = sb + face[3, i], sb + face[4, i], sb + face[5, i]
+    nx, ny, nz, distance, u, v, w = feature(points, a, b, c, d, e, f)
+    p = support(points, sa, na, ra, neighbours, neighbour, seen, a, nx, ny, nz)
+    q = support(points, sb, nb, rb, neighbours, neighbour, seen, d, -nx, -ny, -nz)
+    far = dot(nx, ny, nz, points[0, p] - points[0, q], points[1, p] - points[1, q], points[2, p] - points[2, q])
+    edge = b == c and e == f
+    state = ELSEWHERE
+    if far < -bound:
+        state = AWAY
+    elif far - distance <= noise and holds(a, b, c, d, e, f, u, v, w) and not (edge and distance >= -TOUCHING * noise):
+        state = KEPT
+    elif far > 0.0 and not edge:
+        state = LOST
+        remember(points, vertex, label, 0, a, d)
+        remember(points, vertex, label, 1, b, e)
+        remember(points, vertex, label, 2, c, f)
+        remember(points, vertex, label, 3, support(points, sa, na, ra, neighbours, neighbour, seen, a, -nx, -ny, -nz),
+                 support(points, sb, nb, rb, neighbours, neighbour, seen, d, nx, ny, nz))
+    return state, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w
+
+
+@formula
+def learn(axis, face, i, solid, sa, sb, a, b, c, d, e, f, nx, ny, nz):
+    """Pair i keeps a contact's normal and, unless the hulls' difference has no volume, its feature."""
+    axis[0, i], axis[1, i], axis[2, i], face[0, i] = -nx, -ny, -nz, -1
+    if solid:
+        face[0, i], face[1, i], face[2, i] = a - sa, b - sa, c - sa
+        face[3, i], face[4, i], face[5, i] = d - sb, e - sb, f - sb
+
+
+@kernel
 def collide(hulls, pairs, meetings, narrow, margin, coherent):
     """Contacts of all pairs whose gap is at most `margin` [m], one a pair, in the order of the pairs.
 
@@ -127,9 +169,9 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent):
     """
     points, centre, reach, rounding = hulls.corner, hulls.centre, hulls.reach, hulls.rounding
     start, size, graph, neighbours, neighbour = hulls.start, hulls.size, hulls.graph, hulls.neighbours, hulls.neighbour
-    seen, vertex, label, weight, corner, across = (narrow.seen, narrow.vertex, narrow.label, narrow.weight, narrow.corner,
-                                                   narrow.across)
-    plane, visible, horizon, stack = narrow.plane, narrow.visible, narrow.horizon, narrow.stack
+    seen, vertex, label, weight = narrow.seen, narrow.vertex, narrow.label, narrow.weight
+    corner, across, plane, visible, horizon, stack = (narrow.corner, narrow.across, narrow.plane, narrow.visible, narrow.horizon,
+                                                      narrow.stack)
     first, second, axis, face = pairs.first, pairs.second, pairs.axis, pairs.face
     pair, columns, shares, normal, gap = meetings.pair, meetings.corner, meetings.weight, meetings.normal, meetings.gap
     listed, fits = 0, True
@@ -144,49 +186,33 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent):
         bound = margin + both
         noise = ROUNDING * (span + abs(centre[0, g]) + abs(centre[1, g]) + abs(centre[2, g])
                             + abs(centre[0, h]) + abs(centre[1, h]) + abs(centre[2, h]))
-        found, n, status = False, 0, APART
+        found = False
         a = b = c = d = e = f = 0
         nx = ny = nz = distance = u = v = w = 0.0
         if coherent is not None:
             if face[0, i] >= 0:
-                a, b, c, d, e, f = (sa + face[0, i], sa + face[1, i], sa + face[2, i],
-                                    sb + face[3, i], sb + face[4, i], sb + face[5, i])
-                nx, ny, nz, distance, u, v, w = feature(points, a, b, c, d, e, f)
-                p = support(points, sa, na, ra, neighbours, neighbour, seen, a, nx, ny, nz)
-                q = support(points, sb, nb, rb, neighbours, neighbour, seen, d, -nx, -ny, -nz)
-                far = dot(nx, ny, nz, points[0, p] - points[0, q], points[1, p] - points[1, q], points[2, p] - points[2, q])
-                if far < -bound:
+                state, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w = recall(
+                    points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, bound, face, i, vertex, label)
+                if state == AWAY:
                     continue
-                flat = b == c and e == f        # a point or an edge, no face
-                found = far - distance <= noise and holds(a, b, c, d, e, f, u, v, w) and not (flat and -distance <= TOUCHING * noise)
-                if not found and far == far:
-                    vx, vy, vz = -nx, -ny, -nz
-                    if far > 0.0 and not flat:
-                        remember(points, vertex, label, 0, a, d)
-                        remember(points, vertex, label, 1, b, e)
-                        remember(points, vertex, label, 2, c, f)
-                        p = support(points, sa, na, ra, neighbours, neighbour, seen, a, vx, vy, vz)
-                        q = support(points, sb, nb, rb, neighbours, neighbour, seen, d, nx, ny, nz)
-                        remember(points, vertex, label, 3, p, q)
-                        n = 4
+                found = state == KEPT
+                if state == LOST:
+                    solid, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w = met(
+                        points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, 4,
+                        vertex, label, weight, corner, across, plane, visible, horizon, stack)
+                    found = solid and distance >= 0.0
+                    if found:
+                        learn(axis, face, i, True, sa, sb, a, b, c, d, e, f, nx, ny, nz)
+                vx, vy, vz = -nx, -ny, -nz
             elif axis[0, i] != 0.0 or axis[1, i] != 0.0 or axis[2, i] != 0.0:
                 vx, vy, vz = axis[0, i], axis[1, i], axis[2, i]
-        if n == 4:
-            solid, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w = met(
-                points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
-                vertex, label, weight, corner, across, plane, visible, horizon, stack)
-            found = solid and distance >= 0.0
-            if found:
-                face[0, i], face[1, i], face[2, i], face[3, i], face[4, i], face[5, i] = a - sa, b - sa, c - sa, d - sb, e - sb, f - sb
-            elif solid:
-                vx, vy, vz = -nx, -ny, -nz
         if not found:
             status, n, vx, vy, vz = gjk(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, vx, vy, vz, bound,
                                         vertex, label, weight)
             length = np.sqrt(dot(vx, vy, vz, vx, vy, vz))
             if status == APART or length > bound:
                 if coherent is not None:
-                    axis[0, i], axis[1, i], axis[2, i], face[0, i] = vx / length, vy / length, vz / length, -1
+                    learn(axis, face, i, False, sa, sb, 0, 0, 0, 0, 0, 0, -vx / length, -vy / length, -vz / length)
                 continue
             solid = True
             if status == MET or length <= TOUCHING * noise:
@@ -197,10 +223,7 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent):
                 a, b, c, d, e, f, u, v, w = oriented(vertex, label, weight, n)
                 nx, ny, nz, distance = -vx / length, -vy / length, -vz / length, -length
             if coherent is not None:
-                axis[0, i], axis[1, i], axis[2, i], face[0, i] = -nx, -ny, -nz, -1
-                if solid:
-                    face[0, i], face[1, i], face[2, i] = a - sa, b - sa, c - sa
-                    face[3, i], face[4, i], face[5, i] = d - sb, e - sb, f - sb
+                learn(axis, face, i, solid, sa, sb, a, b, c, d, e, f, nx, ny, nz)
         if -distance > bound:
             continue
         if listed == gap.size:

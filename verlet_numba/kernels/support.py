@@ -74,7 +74,9 @@ def beyond(points, start, row, neighbours, neighbour, seen, corner, dx, dy, dz):
 
 @formula
 def support(points, start, size, row, neighbours, neighbour, seen, warm, dx, dy, dz):
-    """Column of the hull's corner farthest in the direction d; `warm` is a column to climb from."""
+    """Column of the hull's corner farthest in the direction d; `warm` is a column to climb from, unless it lies inside."""
     if row >= 0:
-        return climbed(points, start, row, neighbours, neighbour, seen, warm, dx, dy, dz)
+        corner = row + warm - start
+        if neighbours[corner] < neighbours[corner + 1]:
+            return climbed(points, start, row, neighbours, neighbour, seen, warm, dx, dy, dz)
     return scanned(points, start, size, dx, dy, dz)
