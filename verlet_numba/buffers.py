@@ -216,7 +216,7 @@ class Layered(NamedTuple):
     particle: Array             # (M,) int 1; of a leaf, -1: an inner node
     sphere: Array               # (M, 4) double m; centre and radius
     rectangle: Array            # (M, 4) int 1; first and last i, first and last j, of a cloth's node
-    ends: Array                 # (M, 6) int 1; tail and head of the edges of a cloth's leaf: along i, two along j
+    ends: Array                 # (M, 6) int 1; leaves at tail and head of the edges a cloth's leaf owns: along i, two along j
     bound: Array                # (M, 12) double m; least entries of all edges along i, along j, and of their negatives
     lattice: Array              # (T, 3) double m; spacing along i, along j, closest pair at rest that may meet; 0: no cloth
     radius: Array               # (n,) real m; contact radius

@@ -13,12 +13,15 @@ import math
 
 import numpy as np
 
-from verlet_numba._jit import inlined, kernel
+from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.physics.enclosing import sphere_of_four, sphere_of_spheres
 from verlet_numba.physics.flatness import unfolded
 
 ROUNDING = 4e-16            # of the radius and the coordinates: by how much an inner sphere is enlarged
 SUPPORT = 1.0 + 1e-9        # times the radius through support points, which rounding moves one against another
+import os
+SMALL = int(os.environ.get('SMALL', 7))
+LEAST = int(os.environ.get('LEAST', 9))
 SLACK = 1.0 + 1e-9          # times the reach, before a part is passed over
 
 
@@ -33,7 +36,7 @@ def update_layered(position, layered):
     for t in range(root.size - 1):
         update_spheres(x, y, z, radius, skip, particle, sphere, root[t], root[t + 1])
         if lattice[t, 2] > 0.0:
-            update_bounds(x, y, z, skip, ends, bound, root[t], root[t + 1])
+            update_bounds(skip, sphere, ends, bound, root[t], root[t + 1])
 
 
 @kernel
@@ -52,62 +55,26 @@ def update_spheres(x, y, z, radius, skip, particle, sphere, first, last):
 
 
 @kernel
-def update_bounds(x, y, z, skip, ends, bound, first, last):
+def update_bounds(skip, sphere, ends, bound, first, last):
     """Bounds on the edges below the nodes first to last of a cloth's tree."""
     for k in range(last - 1, first - 1, -1):
-        if skip[k] == k + 1:
-            u, v, w = edge(x, y, z, ends[k, 0], ends[k, 1])
-            a, b, c = edge(x, y, z, ends[k, 2], ends[k, 3])
-            d, e, f = edge(x, y, z, ends[k, 4], ends[k, 5])
-            put(bound, k, (u, v, w, min(a, d), min(b, e), min(c, f), -u, -v, -w, min(-a, -d), min(-b, -e), min(-c, -f)))
+        a, b = k + 1, skip[k + 1]
+        if skip[k] > a:
+            for c in range(12):
+                bound[k, c] = min(bound[a, c], bound[b, c])
         else:
-            put(bound, k, joint(bound, k + 1, skip[k + 1]))
+            p, q, r, s, t, u = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3], ends[k, 4], ends[k, 5]
+            for c in range(3):
+                along, before, after = sphere[q, c] - sphere[p, c], sphere[s, c] - sphere[r, c], sphere[u, c] - sphere[t, c]
+                bound[k, c], bound[k, 3 + c] = along, min(before, after)
+                bound[k, 6 + c], bound[k, 9 + c] = -along, min(-before, -after)
 
 
-@inlined
-def edge(x, y, z, i, j):
-    """The vector from particle i to particle j."""
-    return np.float64(x[j]) - np.float64(x[i]), np.float64(y[j]) - np.float64(y[i]), np.float64(z[j]) - np.float64(z[i])
-
-
-@inlined
-def joint(bound, a, b):
-    """Bounds on the edges of the nodes a and b together."""
-    return (min(bound[a, 0], bound[b, 0]), min(bound[a, 1], bound[b, 1]), min(bound[a, 2], bound[b, 2]),
-            min(bound[a, 3], bound[b, 3]), min(bound[a, 4], bound[b, 4]), min(bound[a, 5], bound[b, 5]),
-            min(bound[a, 6], bound[b, 6]), min(bound[a, 7], bound[b, 7]), min(bound[a, 8], bound[b, 8]),
-            min(bound[a, 9], bound[b, 9]), min(bound[a, 10], bound[b, 10]), min(bound[a, 11], bound[b, 11]))
-
-
-@inlined
-def put(bound, k, values):
-    """Write the bounds of node k."""
-    (bound[k, 0], bound[k, 1], bound[k, 2], bound[k, 3], bound[k, 4], bound[k, 5],
-     bound[k, 6], bound[k, 7], bound[k, 8], bound[k, 9], bound[k, 10], bound[k, 11]) = values
-
-
-@inlined
-def touching(rectangle, a, b):
-    """Whether the rectangles of nodes a and b touch at a side or a corner."""
-    return (rectangle[a, 0] <= rectangle[b, 1] + 1 and rectangle[b, 0] <= rectangle[a, 1] + 1
-            and rectangle[a, 2] <= rectangle[b, 3] + 1 and rectangle[b, 2] <= rectangle[a, 3] + 1)
-
-
-@inlined
-def near(sphere, a, other, b, margin):
-    """Whether the spheres of two nodes are nearer than the margin."""
-    x, y, z = sphere[a, 0] - other[b, 0], sphere[a, 1] - other[b, 1], sphere[a, 2] - other[b, 2]
-    reach = sphere[a, 3] + other[b, 3] + margin
+@formula
+def overlap(ax, ay, az, a, bx, by, bz, b, margin):
+    """Whether two spheres are nearer than the margin."""
+    x, y, z, reach = ax - bx, ay - by, az - bz, a + b + margin
     return x * x + y * y + z * z < reach * reach
-
-
-@inlined
-def excluded(apart, partner, p, q):
-    """Whether particles p and q never meet."""
-    for k in range(apart[p], apart[p + 1]):
-        if partner[k] == q:
-            return True
-    return False
 
 
 @kernel
@@ -129,7 +96,7 @@ def list_pairs(layered, inverse_mass, margin, itself, stack, candidates):
             listed = descend_itself(root[t], skip, particle, sphere, rectangle, bound, lattice[t, 0], lattice[t, 1],
                                     lattice[t, 2], reach, apart, partner, inverse_mass, margin, first, second, one, two, listed)
         for u in range(t + 1, root.size - 1):
-            if listed >= 0 and near(sphere, root[t], sphere, root[u], margin):
+            if listed >= 0:
                 listed = descend(root[t], root[u], skip, particle, sphere, apart, partner, inverse_mass, margin,
                                  first, second, one, two, listed)
         if listed < 0:
@@ -152,30 +119,58 @@ def largest(radius, particle, first, last):
 def descend_itself(top, skip, particle, sphere, rectangle, bound, a, b, closest, reach, apart, partner, inverse_mass, margin,
                    first, second, one, two, listed):
     """List the pairs within the tree below `top`; the new number of pairs, -1: no room."""
-    ratio = reach / closest         # infinite where there is no lattice: nothing is passed over
+    ratio = reach / closest         # infinite where there is no lattice
     cloth = closest > 0.0
     first[0], second[0], height = top, top, 1
     while height > 0:
         height -= 1
         k, l = first[height], second[height]
         if k == l:
-            if skip[k] == k + 1 or (cloth and unfolded(joint(bound, k, k), a, b, ratio)):
+            if skip[k] == k + 1:
+                continue
+            if cloth and skip[k] - k >= LEAST and unfolded(
+                    bound[k, 0], bound[k, 1], bound[k, 2], bound[k, 3], bound[k, 4], bound[k, 5],
+                    bound[k, 6], bound[k, 7], bound[k, 8], bound[k, 9], bound[k, 10], bound[k, 11], a, b, ratio):
                 continue
             c, d = k + 1, skip[k + 1]
             first[height], second[height] = c, c
             first[height + 1], second[height + 1] = d, d
             first[height + 2], second[height + 2] = c, d
             height += 3
-        elif near(sphere, k, sphere, l, margin):
-            p, q = particle[k], particle[l]
-            if p >= 0 and q >= 0:
-                if inverse_mass[p] + inverse_mass[q] > 0.0 and not excluded(apart, partner, p, q):
-                    if listed == one.size:
-                        return -1
-                    one[listed], two[listed] = min(p, q), max(p, q)
-                    listed += 1
-            elif not (cloth and touching(rectangle, k, l) and unfolded(joint(bound, k, l), a, b, ratio)):
-                height = push_children(first, second, height, skip, sphere, k, l)
+            continue
+        if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
+                       sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
+            continue
+        p, q = particle[k], particle[l]
+        if p >= 0 and q >= 0:
+            if not inverse_mass[p] + inverse_mass[q] > 0.0:
+                continue
+            never = 0
+            for m in range(apart[p], apart[p + 1]):
+                never += partner[m] == q
+            if never:
+                continue
+            if listed == one.size:
+                return -1
+            one[listed], two[listed] = min(p, q), max(p, q)
+            listed += 1
+            continue
+        if (cloth and skip[k] - k >= LEAST and skip[l] - l >= LEAST
+                and rectangle[k, 0] <= rectangle[l, 1] + 1 and rectangle[l, 0] <= rectangle[k, 1] + 1
+                and rectangle[k, 2] <= rectangle[l, 3] + 1 and rectangle[l, 2] <= rectangle[k, 3] + 1
+                and unfolded(min(bound[k, 0], bound[l, 0]), min(bound[k, 1], bound[l, 1]), min(bound[k, 2], bound[l, 2]),
+                             min(bound[k, 3], bound[l, 3]), min(bound[k, 4], bound[l, 4]), min(bound[k, 5], bound[l, 5]),
+                             min(bound[k, 6], bound[l, 6]), min(bound[k, 7], bound[l, 7]), min(bound[k, 8], bound[l, 8]),
+                             min(bound[k, 9], bound[l, 9]), min(bound[k, 10], bound[l, 10]), min(bound[k, 11], bound[l, 11]),
+                             a, b, ratio)):
+            continue
+        if q >= 0 or (p < 0 and sphere[k, 3] >= sphere[l, 3]):
+            first[height], second[height] = skip[k + 1], l
+            first[height + 1], second[height + 1] = k + 1, l
+        else:
+            first[height], second[height] = k, skip[l + 1]
+            first[height + 1], second[height + 1] = k, l + 1
+        height += 2
     return listed
 
 
@@ -186,29 +181,29 @@ def descend(top, other, skip, particle, sphere, apart, partner, inverse_mass, ma
     while height > 0:
         height -= 1
         k, l = first[height], second[height]
-        if near(sphere, k, sphere, l, margin):
-            p, q = particle[k], particle[l]
-            if p >= 0 and q >= 0:
-                if inverse_mass[p] + inverse_mass[q] > 0.0 and not excluded(apart, partner, p, q):
-                    if listed == one.size:
-                        return -1
-                    one[listed], two[listed] = min(p, q), max(p, q)
-                    listed += 1
-            else:
-                height = push_children(first, second, height, skip, sphere, k, l)
+        if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
+                       sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
+            continue
+        p, q = particle[k], particle[l]
+        if p >= 0 and q >= 0:
+            never = 0
+            for m in range(apart[p], apart[p + 1]):
+                never += partner[m] == q
+            if never or not inverse_mass[p] + inverse_mass[q] > 0.0:
+                continue
+            if listed == one.size:
+                return -1
+            one[listed], two[listed] = min(p, q), max(p, q)
+            listed += 1
+        elif q >= 0 or (p < 0 and sphere[k, 3] >= sphere[l, 3]):
+            first[height], second[height] = skip[k + 1], l
+            first[height + 1], second[height + 1] = k + 1, l
+            height += 2
+        else:
+            first[height], second[height] = k, skip[l + 1]
+            first[height + 1], second[height + 1] = k, l + 1
+            height += 2
     return listed
-
-
-@inlined
-def push_children(first, second, height, skip, sphere, k, l):
-    """Leave for later the children of the larger of two nodes, each with the other node; the new height of the stack."""
-    if skip[l] == l + 1 or (skip[k] != k + 1 and sphere[k, 3] >= sphere[l, 3]):
-        first[height], second[height] = k + 1, l
-        first[height + 1], second[height + 1] = skip[k + 1], l
-    else:
-        first[height], second[height] = k, l + 1
-        first[height + 1], second[height + 1] = k, skip[l + 1]
-    return height + 2
 
 
 @kernel

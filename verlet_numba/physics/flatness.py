@@ -26,12 +26,11 @@ from verlet_numba._jit import formula
 
 
 @formula
-def unfolded(bound, a, b, ratio):
-    """Whether |F d| > ratio |d| for all d. `bound`: least entries of both edges [m], then least of their negatives.
+def unfolded(lu, lv, lw, lx, ly, lz, hu, hv, hw, hx, hy, hz, a, b, ratio):
+    """Whether |F d| > ratio |d| for all d. Least entries of both edges [m], then least of their negatives.
 
     a and b are the lattice's spacings [m]; `ratio` is that of the reach to the rest distance of the closest pair.
     """
-    lu, lv, lw, lx, ly, lz, hu, hv, hw, hx, hy, hz = bound
     p, q = 0.5 / a, 0.5 / b
     gu, gv, gw, gx, gy, gz = (lu - hu) * p, (lv - hv) * p, (lw - hw) * p, (lx - hx) * q, (ly - hy) * q, (lz - hz) * q
     su, sv, sw, sx, sy, sz = -(lu + hu) * p, -(lv + hv) * p, -(lw + hw) * p, -(lx + hx) * q, -(ly + hy) * q, -(lz + hz) * q

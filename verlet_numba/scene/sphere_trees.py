@@ -166,7 +166,7 @@ def layered_of(bodies: list[Body], numbering: Numbering, size: int, real: Any, a
             particle[part] = np.where(inner, -1, own[tree.leaf])
             radius[own] = shape.radius
             if len(tree.rectangle):
-                rectangle[part], ends[part], lattice[t] = tree.rectangle, own[edges_of(shape)[tree.leaf]], lattice_of(shape)
+                rectangle[part], ends[part], lattice[t] = tree.rectangle, ends_of(shape, tree) + root[t], lattice_of(shape)
             t += 1
     apart, partner = exclusions(soft, size, attached)
     return Layered(*(gate(array, np.int64) for array in (root, skip, particle)), gate(np.zeros((total, 4)), np.float64),
@@ -190,18 +190,19 @@ def spacing(shape: Shape) -> tuple[float, float]:
             float(np.linalg.norm(corners[2] - corners[0])) / (int(ny) - 1))
 
 
-def edges_of(shape: Shape) -> Integers:
-    """(P, 6) tail and head of the edges that each particle of a cloth owns: that to (i + 1, j), those to (i, j - 1), (i, j + 1).
+def ends_of(shape: Shape, tree: Tree) -> Integers:
+    """(M, 6) tail and head, as leaves, of the edges that a cloth's leaf (i, j) owns: to (i + 1, j), from (i, j - 1), to (i, j + 1).
 
-    Where the cloth ends, an edge is the nearest one in its line.
+    Where the cloth ends, an edge that does not exist is the nearest one in its line.
     """
-    _, nx, ny = shape.layout
-    i, j = np.divmod(np.arange(int(nx) * int(ny)), int(ny))
-    along, before, after = np.minimum(i, int(nx) - 2), np.maximum(j - 1, 0), np.minimum(j, int(ny) - 2)
-    number = [along * int(ny) + j, (along + 1) * int(ny) + j]
-    for low in (before, after):
-        number += [i * int(ny) + low, i * int(ny) + low + 1]
-    return np.stack(number, axis=1)
+    nx, ny = int(shape.layout[1]), int(shape.layout[2])
+    i, j = np.divmod(np.arange(nx * ny), ny)
+    along, before, after = np.minimum(i, nx - 2), np.maximum(j - 1, 0), np.minimum(j, ny - 2)
+    particles = [along * ny + j, (along + 1) * ny + j, i * ny + before, i * ny + before + 1, i * ny + after, i * ny + after + 1]
+    node = np.argsort(tree.leaf)[-nx * ny:]                             # leaf of each particle
+    result = np.zeros((len(tree.leaf), 6), np.int64)
+    result[node] = node[np.stack(particles, axis=1)]
+    return result
 
 
 def lattice_of(shape: Shape) -> tuple[float, float, float]:
