@@ -207,18 +207,23 @@ class Meetings(NamedTuple):
 class Layered(NamedTuple):
     """Sphere trees of deformable bodies, one a body, nodes in preorder: a node's children are k + 1 and skip[k + 1].
 
-    Leaves are particles; a parent encloses the spheres of its children. A cloth's nodes are rectangles of its lattice.
-    A node is visited alone, so its numbers stand side by side.
+    Leaves are particles; a parent encloses the spheres of its children. A node is visited alone, so its numbers stand
+    side by side. Nodes of a cloth's tree are rectangles of its lattice; those that are not small have bounds on their edges.
     """
 
     root: Array                 # (T + 1,) int 1; nodes of tree t: root[t] to root[t + 1]
     skip: Array                 # (M,) int 1; the node after the subtree; k + 1 of a leaf
     particle: Array             # (M,) int 1; of a leaf, -1: an inner node
+    leaf: Array                 # (J,) int 1; all leaves
+    inner: Array                # (I,) int 1; all inner nodes, the deepest first
     sphere: Array               # (M, 4) double m; centre and radius
-    rectangle: Array            # (M, 4) int 1; first and last i, first and last j, of a cloth's node
-    ends: Array                 # (M, 6) int 1; leaves at tail and head of the edges a cloth's leaf owns: along i, two along j
-    bound: Array                # (M, 12) double m; least entries of all edges along i, along j, and of their negatives
-    lattice: Array              # (T, 3) double m; spacing along i, along j, closest pair at rest that may meet; 0: no cloth
+    row: Array                  # (M,) int 1; where the node's bounds stand, -1: it has none
+    node: Array                 # (R,) int 1; in ascending order
+    rectangle: Array            # (R, 4) int 1; first and last i, first and last j
+    bound: Array                # (R, 12) double m; of edges along i and along j: least x, y, z each, then largest
+    start: Array                # (E + 1,) int 1; of row r, if its children have none: edges along i from start[2 r] on, along j
+    ends: Array                 # (2, U) int 1; from start[2 r + 1] on; leaves at tail and head
+    lattice: Array              # (T, 4) double m; spacing along i, along j, closest pair at rest that may meet, contact radius
     radius: Array               # (n,) real m; contact radius
     apart: Array                # (n + 1,) int 1; particle p never meets partner[apart[p]:apart[p + 1]]
     partner: Array              # (X,) int 1; in ascending order
@@ -249,7 +254,7 @@ class Stack(NamedTuple):
 class Candidates(NamedTuple):
     """Pairs that are nearer than a margin: two particles, the smaller number first, or a particle and a rigid leaf."""
 
-    listed: Array               # (1,) int 1; how many there are
+    listed: Array               # (1,) int 1; how many there are; -1: not looked for yet
     first: Array                # (P,) int 1
     second: Array               # (P,) int 1
 

@@ -1,12 +1,14 @@
-"""Sphere trees: update and traversal (paper, 5.2). Every pair nearer than the margin is found, none is found twice.
+"""Sphere trees: update and traversal (paper, 5.2). Every pair nearer than the margin is found, and found once.
 
 Spheres of inner nodes are rounded up, leaves compare exact distances: what is listed is what all pairs would give.
 
-A cloth against itself: neighbours in a flat sheet are always near. Whole parts are passed over if the bounds on their
-edges prove that no two of their particles that may meet are within reach (physics/flatness.py). Two parts are passed
-over together if their rectangles touch, at a side or at a corner: then a path without a turn back joins any two of their
-particles along edges that one of them owns, since a particle owns both its edges along j and the one to the next i. That
-proves what it needs, so what is listed does not depend on it.
+In a flat cloth neighbours are near everywhere. So whole parts are passed over, alone or two together, where bounds on
+their edges prove that no two of their particles that may meet are within reach (physics/flatness.py). Two parts may be
+taken together if their rectangles touch, at a side or at a corner: then a path without a turn back joins any two of their
+particles by edges that one of the parts owns, as a particle owns both its edges along j and that to the next i. The proof
+assumes nothing about the cloth's shape, so what is listed does not depend on it.
+
+Loops work on bare arrays and scalars: an array that is passed or looked up within a loop has its references counted.
 """
 
 import math
@@ -17,11 +19,8 @@ from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.physics.enclosing import sphere_of_four, sphere_of_spheres
 from verlet_numba.physics.flatness import unfolded
 
-ROUNDING = 4e-16            # of the radius and the coordinates: by how much an inner sphere is enlarged
+ROUNDING = 4e-15            # of the radius and the coordinates: by how much an inner sphere is enlarged
 SUPPORT = 1.0 + 1e-9        # times the radius through support points, which rounding moves one against another
-import os
-SMALL = int(os.environ.get('SMALL', 7))
-LEAST = int(os.environ.get('LEAST', 9))
 SLACK = 1.0 + 1e-9          # times the reach, before a part is passed over
 
 
@@ -30,44 +29,44 @@ def update_layered(position, layered):
     """Spheres of all nodes and bounds on the edges of cloth, from the leaves up, in O(n) (P16)."""
     if layered is None:
         return
-    root, skip, particle, sphere, radius = layered.root, layered.skip, layered.particle, layered.sphere, layered.radius
-    ends, bound, lattice = layered.ends, layered.bound, layered.lattice
-    x, y, z = position[0], position[1], position[2]
-    for t in range(root.size - 1):
-        update_spheres(x, y, z, radius, skip, particle, sphere, root[t], root[t + 1])
-        if lattice[t, 2] > 0.0:
-            update_bounds(skip, sphere, ends, bound, root[t], root[t + 1])
+    update_spheres(position, layered.radius, layered.skip, layered.particle, layered.leaf, layered.inner, layered.sphere)
+    update_bounds(layered.skip, layered.sphere, layered.row, layered.node, layered.start, layered.ends, layered.bound)
 
 
 @kernel
-def update_spheres(x, y, z, radius, skip, particle, sphere, first, last):
-    """Spheres of the nodes first to last: of leaves those of their particles, else those about their two children."""
-    for k in range(last - 1, first - 1, -1):
+def update_spheres(position, radius, skip, particle, leaf, inner, sphere):
+    """Spheres of leaves, then those about two children each. Nodes of one level do not wait for each other."""
+    x, y, z = position[0], position[1], position[2]
+    for k in leaf:
         p = particle[k]
-        if p >= 0:
-            cx, cy, cz, r = np.float64(x[p]), np.float64(y[p]), np.float64(z[p]), np.float64(radius[p])
-        else:
-            a, b = k + 1, skip[k + 1]
-            cx, cy, cz, r = sphere_of_spheres(sphere[a, 0], sphere[a, 1], sphere[a, 2], sphere[a, 3],
-                                              sphere[b, 0], sphere[b, 1], sphere[b, 2], sphere[b, 3])
-            r += ROUNDING * (r + abs(cx) + abs(cy) + abs(cz))
+        sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3] = x[p], y[p], z[p], radius[p]
+    for k in inner:
+        a, b = k + 1, skip[k + 1]
+        cx, cy, cz, r = sphere_of_spheres(sphere[a, 0], sphere[a, 1], sphere[a, 2], sphere[a, 3],
+                                          sphere[b, 0], sphere[b, 1], sphere[b, 2], sphere[b, 3])
+        r += ROUNDING * (r + abs(cx) + abs(cy) + abs(cz))
         sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3] = cx, cy, cz, r
 
 
 @kernel
-def update_bounds(skip, sphere, ends, bound, first, last):
-    """Bounds on the edges below the nodes first to last of a cloth's tree."""
-    for k in range(last - 1, first - 1, -1):
-        a, b = k + 1, skip[k + 1]
-        if skip[k] > a:
-            for c in range(12):
-                bound[k, c] = min(bound[a, c], bound[b, c])
+def update_bounds(skip, sphere, row, node, start, ends, bound):
+    """Bounds on the edges of all rows, from the last to the first: of listed edges, or of two children together."""
+    for r in range(node.size - 1, -1, -1):
+        if start[2 * r] < start[2 * r + 2]:
+            for way in range(2):
+                lx, ly, lz, hx, hy, hz = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
+                for e in range(start[2 * r + way], start[2 * r + way + 1]):
+                    p, q = ends[0, e], ends[1, e]
+                    dx, dy, dz = sphere[q, 0] - sphere[p, 0], sphere[q, 1] - sphere[p, 1], sphere[q, 2] - sphere[p, 2]
+                    lx, ly, lz, hx, hy, hz = min(lx, dx), min(ly, dy), min(lz, dz), max(hx, dx), max(hy, dy), max(hz, dz)
+                c = 3 * way
+                bound[r, c], bound[r, c + 1], bound[r, c + 2] = lx, ly, lz
+                bound[r, c + 6], bound[r, c + 7], bound[r, c + 8] = hx, hy, hz
         else:
-            p, q, r, s, t, u = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3], ends[k, 4], ends[k, 5]
-            for c in range(3):
-                along, before, after = sphere[q, c] - sphere[p, c], sphere[s, c] - sphere[r, c], sphere[u, c] - sphere[t, c]
-                bound[k, c], bound[k, 3 + c] = along, min(before, after)
-                bound[k, 6 + c], bound[k, 9 + c] = -along, min(-before, -after)
+            a, b = row[node[r] + 1], row[skip[node[r] + 1]]
+            for c in range(6):
+                bound[r, c] = min(bound[a, c], bound[b, c])
+                bound[r, 6 + c] = max(bound[a, 6 + c], bound[b, 6 + c])
 
 
 @formula
@@ -86,51 +85,42 @@ def list_pairs(layered, inverse_mass, margin, itself, stack, candidates):
     if layered is None:
         return True
     root, skip, particle, sphere = layered.root, layered.skip, layered.particle, layered.sphere
-    rectangle, bound, lattice = layered.rectangle, layered.bound, layered.lattice
+    row, rectangle, bound, lattice = layered.row, layered.rectangle, layered.bound, layered.lattice
     apart, partner, one, two = layered.apart, layered.partner, candidates.first, candidates.second
     first, second = stack.first, stack.second
     listed = 0
     for t in range(root.size - 1):
-        if itself:
-            reach = (2.0 * largest(layered.radius, particle, root[t], root[t + 1]) + margin) * SLACK
-            listed = descend_itself(root[t], skip, particle, sphere, rectangle, bound, lattice[t, 0], lattice[t, 1],
-                                    lattice[t, 2], reach, apart, partner, inverse_mass, margin, first, second, one, two, listed)
-        for u in range(t + 1, root.size - 1):
-            if listed >= 0:
-                listed = descend(root[t], root[u], skip, particle, sphere, apart, partner, inverse_mass, margin,
-                                 first, second, one, two, listed)
-        if listed < 0:
-            return False
+        for u in range(t if itself else t + 1, root.size - 1):
+            k, l = root[t], root[u]
+            if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
+                           sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
+                continue
+            ratio = (2.0 * lattice[t, 3] + margin) * SLACK / lattice[t, 2]
+            listed = descend(k, l, skip, particle, sphere, row, rectangle, bound, lattice[t, 0], lattice[t, 1], ratio,
+                             apart, partner, inverse_mass, margin, first, second, one, two, listed)
+            if listed < 0:
+                return False
     candidates.listed[0] = listed
     return True
 
 
 @kernel
-def largest(radius, particle, first, last):
-    """The largest radius of the leaves in the nodes first to last."""
-    found = 0.0
-    for k in range(first, last):
-        if particle[k] >= 0:
-            found = max(found, np.float64(radius[particle[k]]))
-    return found
+def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, ratio, apart, partner, inverse_mass, margin,
+            first, second, one, two, listed):
+    """List the pairs of the trees below two nodes, or below one and the same; the new number of pairs, -1: no room.
 
-
-@kernel
-def descend_itself(top, skip, particle, sphere, rectangle, bound, a, b, closest, reach, apart, partner, inverse_mass, margin,
-                   first, second, one, two, listed):
-    """List the pairs within the tree below `top`; the new number of pairs, -1: no room."""
-    ratio = reach / closest         # infinite where there is no lattice
-    cloth = closest > 0.0
-    first[0], second[0], height = top, top, 1
+    a and b are the lattice's spacings, `ratio` as in `unfolded`: rectangles mean nothing between two trees.
+    """
+    alone = top == other
+    first[0], second[0], height = top, other, 1
     while height > 0:
         height -= 1
         k, l = first[height], second[height]
         if k == l:
-            if skip[k] == k + 1:
-                continue
-            if cloth and skip[k] - k >= LEAST and unfolded(
-                    bound[k, 0], bound[k, 1], bound[k, 2], bound[k, 3], bound[k, 4], bound[k, 5],
-                    bound[k, 6], bound[k, 7], bound[k, 8], bound[k, 9], bound[k, 10], bound[k, 11], a, b, ratio):
+            r = row[k]
+            if skip[k] == k + 1 or (r >= 0 and unfolded(
+                    bound[r, 0], bound[r, 1], bound[r, 2], bound[r, 3], bound[r, 4], bound[r, 5],
+                    bound[r, 6], bound[r, 7], bound[r, 8], bound[r, 9], bound[r, 10], bound[r, 11], a, b, ratio)):
                 continue
             c, d = k + 1, skip[k + 1]
             first[height], second[height] = c, c
@@ -141,28 +131,25 @@ def descend_itself(top, skip, particle, sphere, rectangle, bound, a, b, closest,
         if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
                        sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
             continue
-        p, q = particle[k], particle[l]
+        p, q, r, s = particle[k], particle[l], row[k], row[l]
         if p >= 0 and q >= 0:
-            if not inverse_mass[p] + inverse_mass[q] > 0.0:
-                continue
-            never = 0
+            never = False
             for m in range(apart[p], apart[p + 1]):
-                never += partner[m] == q
-            if never:
+                never |= partner[m] == q
+            if never or not inverse_mass[p] + inverse_mass[q] > 0.0:
                 continue
             if listed == one.size:
                 return -1
             one[listed], two[listed] = min(p, q), max(p, q)
             listed += 1
             continue
-        if (cloth and skip[k] - k >= LEAST and skip[l] - l >= LEAST
-                and rectangle[k, 0] <= rectangle[l, 1] + 1 and rectangle[l, 0] <= rectangle[k, 1] + 1
-                and rectangle[k, 2] <= rectangle[l, 3] + 1 and rectangle[l, 2] <= rectangle[k, 3] + 1
-                and unfolded(min(bound[k, 0], bound[l, 0]), min(bound[k, 1], bound[l, 1]), min(bound[k, 2], bound[l, 2]),
-                             min(bound[k, 3], bound[l, 3]), min(bound[k, 4], bound[l, 4]), min(bound[k, 5], bound[l, 5]),
-                             min(bound[k, 6], bound[l, 6]), min(bound[k, 7], bound[l, 7]), min(bound[k, 8], bound[l, 8]),
-                             min(bound[k, 9], bound[l, 9]), min(bound[k, 10], bound[l, 10]), min(bound[k, 11], bound[l, 11]),
-                             a, b, ratio)):
+        if (alone and r >= 0 and s >= 0 and rectangle[r, 0] <= rectangle[s, 1] + 1 and rectangle[s, 0] <= rectangle[r, 1] + 1
+                and rectangle[r, 2] <= rectangle[s, 3] + 1 and rectangle[s, 2] <= rectangle[r, 3] + 1 and unfolded(
+                    min(bound[r, 0], bound[s, 0]), min(bound[r, 1], bound[s, 1]), min(bound[r, 2], bound[s, 2]),
+                    min(bound[r, 3], bound[s, 3]), min(bound[r, 4], bound[s, 4]), min(bound[r, 5], bound[s, 5]),
+                    max(bound[r, 6], bound[s, 6]), max(bound[r, 7], bound[s, 7]), max(bound[r, 8], bound[s, 8]),
+                    max(bound[r, 9], bound[s, 9]), max(bound[r, 10], bound[s, 10]), max(bound[r, 11], bound[s, 11]),
+                    a, b, ratio)):
             continue
         if q >= 0 or (p < 0 and sphere[k, 3] >= sphere[l, 3]):
             first[height], second[height] = skip[k + 1], l
@@ -171,38 +158,6 @@ def descend_itself(top, skip, particle, sphere, rectangle, bound, a, b, closest,
             first[height], second[height] = k, skip[l + 1]
             first[height + 1], second[height + 1] = k, l + 1
         height += 2
-    return listed
-
-
-@kernel
-def descend(top, other, skip, particle, sphere, apart, partner, inverse_mass, margin, first, second, one, two, listed):
-    """List the pairs between the trees below two nodes; the new number of pairs, -1: no room."""
-    first[0], second[0], height = top, other, 1
-    while height > 0:
-        height -= 1
-        k, l = first[height], second[height]
-        if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
-                       sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
-            continue
-        p, q = particle[k], particle[l]
-        if p >= 0 and q >= 0:
-            never = 0
-            for m in range(apart[p], apart[p + 1]):
-                never += partner[m] == q
-            if never or not inverse_mass[p] + inverse_mass[q] > 0.0:
-                continue
-            if listed == one.size:
-                return -1
-            one[listed], two[listed] = min(p, q), max(p, q)
-            listed += 1
-        elif q >= 0 or (p < 0 and sphere[k, 3] >= sphere[l, 3]):
-            first[height], second[height] = skip[k + 1], l
-            first[height + 1], second[height + 1] = k + 1, l
-            height += 2
-        else:
-            first[height], second[height] = k, skip[l + 1]
-            first[height + 1], second[height + 1] = k, l + 1
-            height += 2
     return listed
 
 
@@ -229,9 +184,10 @@ def update_wrapped(points, support, sphere, k):
 
 @kernel
 def list_against(layered, points, wrapped, margin, stack, candidates):
-    """List the particles of deformable bodies nearer than the margin to the sphere of a rigid leaf (P17).
+    """List the particles of deformable bodies with the rigid leaves that they may be near (P17).
 
-    `points` are what the wrapped trees are about. False: no room (grow and call again).
+    None is missed that is nearer than the margin to what the leaf's points span; all are that near to the leaf's sphere, and
+    to those above it. `points` are what the wrapped trees are about. False: no room (grow and call again).
     """
     if layered is None or wrapped is None:
         return True
@@ -261,7 +217,8 @@ def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, sp
         if stamp[l] != now:
             stamp[l] = now
             update_wrapped(points, support, spheres, l)
-        if near(sphere, k, spheres, l, margin):
+        if overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
+                   spheres[l, 0], spheres[l, 1], spheres[l, 2], spheres[l, 3], margin):
             if particle[k] >= 0 and leaf[l] >= 0:
                 if listed == one.size:
                     return -1

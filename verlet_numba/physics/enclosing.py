@@ -45,21 +45,18 @@ def sphere_of_three(ax, ay, az, bx, by, bz, cx, cy, cz):
 
 
 @formula
-def circumsphere(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz):
-    """Sphere through the corners of a tetrahedron: centre and squared radius.
+def circumcentre(ux, uy, uz, vx, vy, vz, wx, wy, wz):
+    """Centre of the sphere through the corners 0, u, v, w of a tetrahedron.
 
-    The centre o, counted from a, is as far from a as from b, c and d: 2 o . u = u . u for u = b - a, likewise v and w.
-    Solved by Cramer's rule: 2 o = (u.u v x w + v.v w x u + w.w u x v) / (u . v x w).
+    The centre o is as far from 0 as from u, v and w: 2 o . u = u . u, likewise v and w. Solved by Cramer's rule:
+    2 o = (u.u v x w + v.v w x u + w.w u x v) / (u . v x w).
     """
-    ux, uy, uz, vx, vy, vz, wx, wy, wz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az, dx - ax, dy - ay, dz - az
     px, py, pz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
     qx, qy, qz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
     rx, ry, rz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     uu, vv, ww = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
     scale = 0.5 / (ux * px + uy * py + uz * pz)
-    x, y, z = (scale * (uu * px + vv * qx + ww * rx), scale * (uu * py + vv * qy + ww * ry),
-               scale * (uu * pz + vv * qz + ww * rz))
-    return ax + x, ay + y, az + z, x * x + y * y + z * z
+    return scale * (uu * px + vv * qx + ww * rx), scale * (uu * py + vv * qy + ww * ry), scale * (uu * pz + vv * qz + ww * rz)
 
 
 @formula
@@ -67,22 +64,24 @@ def sphere_of_four(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz):
     """Smallest sphere of four points: centre, squared radius and support. Equal points are allowed.
 
     It is that of three of them if one of these holds the fourth, the circumsphere otherwise. Points in a plane always
-    have such a three, to rounding (INSIDE): the circumsphere is left to what has a volume.
+    have such a three, to rounding (INSIDE): the circumsphere is left to what has a volume. All is counted from a, so
+    that rounding is that of the points' distances, wherever they are.
     """
-    x, y, z, squared, support = sphere_of_three(bx, by, bz, cx, cy, cz, dx, dy, dz)
-    if (ax - x) ** 2 + (ay - y) ** 2 + (az - z) ** 2 <= squared * INSIDE:
-        return x, y, z, squared, support << 1
-    x, y, z, squared, support = sphere_of_three(cx, cy, cz, dx, dy, dz, ax, ay, az)
-    if (bx - x) ** 2 + (by - y) ** 2 + (bz - z) ** 2 <= squared * INSIDE:
-        return x, y, z, squared, (support << 2 | support >> 2) & 13
-    x, y, z, squared, support = sphere_of_three(dx, dy, dz, ax, ay, az, bx, by, bz)
-    if (cx - x) ** 2 + (cy - y) ** 2 + (cz - z) ** 2 <= squared * INSIDE:
-        return x, y, z, squared, (support << 3 | support >> 1) & 11
-    x, y, z, squared, support = sphere_of_three(ax, ay, az, bx, by, bz, cx, cy, cz)
-    if (dx - x) ** 2 + (dy - y) ** 2 + (dz - z) ** 2 <= squared * INSIDE:
-        return x, y, z, squared, support
-    x, y, z, squared = circumsphere(ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
-    return x, y, z, squared, 15
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az, dx - ax, dy - ay, dz - az
+    x, y, z, squared, support = sphere_of_three(ux, uy, uz, vx, vy, vz, wx, wy, wz)
+    if x * x + y * y + z * z <= squared * INSIDE:
+        return ax + x, ay + y, az + z, squared, support << 1
+    x, y, z, squared, support = sphere_of_three(vx, vy, vz, wx, wy, wz, 0.0, 0.0, 0.0)
+    if (ux - x) ** 2 + (uy - y) ** 2 + (uz - z) ** 2 <= squared * INSIDE:
+        return ax + x, ay + y, az + z, squared, (support << 2 | support >> 2) & 13
+    x, y, z, squared, support = sphere_of_three(wx, wy, wz, 0.0, 0.0, 0.0, ux, uy, uz)
+    if (vx - x) ** 2 + (vy - y) ** 2 + (vz - z) ** 2 <= squared * INSIDE:
+        return ax + x, ay + y, az + z, squared, (support << 3 | support >> 1) & 11
+    x, y, z, squared, support = sphere_of_three(0.0, 0.0, 0.0, ux, uy, uz, vx, vy, vz)
+    if (wx - x) ** 2 + (wy - y) ** 2 + (wz - z) ** 2 <= squared * INSIDE:
+        return ax + x, ay + y, az + z, squared, support
+    x, y, z = circumcentre(ux, uy, uz, vx, vy, vz, wx, wy, wz)
+    return ax + x, ay + y, az + z, x * x + y * y + z * z, 15
 
 
 @formula

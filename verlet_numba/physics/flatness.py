@@ -27,13 +27,13 @@ from verlet_numba._jit import formula
 
 @formula
 def unfolded(lu, lv, lw, lx, ly, lz, hu, hv, hw, hx, hy, hz, a, b, ratio):
-    """Whether |F d| > ratio |d| for all d. Least entries of both edges [m], then least of their negatives.
+    """Whether |F d| > ratio |d| for all d. Least entries of both edges [m], then their largest.
 
     a and b are the lattice's spacings [m]; `ratio` is that of the reach to the rest distance of the closest pair.
     """
     p, q = 0.5 / a, 0.5 / b
-    gu, gv, gw, gx, gy, gz = (lu - hu) * p, (lv - hv) * p, (lw - hw) * p, (lx - hx) * q, (ly - hy) * q, (lz - hz) * q
-    su, sv, sw, sx, sy, sz = -(lu + hu) * p, -(lv + hv) * p, -(lw + hw) * p, -(lx + hx) * q, -(ly + hy) * q, -(lz + hz) * q
+    gu, gv, gw, gx, gy, gz = (hu + lu) * p, (hv + lv) * p, (hw + lw) * p, (hx + lx) * q, (hy + ly) * q, (hz + lz) * q
+    su, sv, sw, sx, sy, sz = (hu - lu) * p, (hv - lv) * p, (hw - lw) * p, (hx - lx) * q, (hy - ly) * q, (hz - lz) * q
     au, av, aw, ax, ay, az = abs(gu), abs(gv), abs(gw), abs(gx), abs(gy), abs(gz)
     least = ratio * ratio
     A = au * (au - 2.0 * su) + av * (av - 2.0 * sv) + aw * (aw - 2.0 * sw) - least

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Array, Candidates, Layered, Spheres, Stack, Wrapped, gate
+from verlet_numba.buffers import Candidates, Layered, Spheres, Stack, Wrapped, gate
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.numbering import Numbering
 
 INSIDE = 1 + 1e-12          # times a squared radius: what rounding may leave outside
-MARGIN = 0.2                # of the shortest stick: how near two spheres are listed, beyond touching
+PATCH = 16                  # particles of a cloth: nodes with more of them, and their children, have bounds on their edges
 FIRST_ROOM = 256            # candidates; buffers grow as needed
 
 
@@ -25,17 +25,18 @@ class Tree(NamedTuple):
 
     skip: Integers              # (M,) the node after the subtree
     leaf: Integers              # (M,) number of the leaf, -1: an inner node
+    level: Integers             # (M,) parents above the node
     rectangle: Integers         # (M, 4) or (0, 4)
 
 
 def halved(centres: Floats) -> Tree:
     """The tree over leaves with these centres (L, 3), L >= 1."""
     count = len(centres)
-    skip, leaf = np.zeros(2 * count - 1, np.int64), np.full(2 * count - 1, -1)
+    skip, leaf, level = (np.full(2 * count - 1, -1) for _ in range(3))
     order = np.arange(count)                                            # leaves, those of a node side by side
     node, start, size = np.array([0]), np.array([0]), np.array([count])
     while len(node):
-        skip[node] = node + 2 * size - 1
+        skip[node], level[node] = node + 2 * size - 1, level.max() + 1
         single = size == 1
         leaf[node[single]] = order[start[single]]
         node, start, size = node[~single], start[~single], size[~single]
@@ -49,16 +50,17 @@ def halved(centres: Floats) -> Tree:
         left = (size + 1) // 2
         node, start = np.concatenate([node + 1, node + 2 * left]), np.concatenate([start, start + left])
         size = np.concatenate([left, size - left])
-    return Tree(skip, leaf, np.zeros((0, 4), np.int64))
+    return Tree(skip, leaf, level, np.zeros((0, 4), np.int64))
 
 
 def halved_grid(nx: int, ny: int, dx: float, dy: float) -> Tree:
     """The tree over the particles i ny + j of a cloth with these spacings: rectangles, halved along the longer side."""
     count = nx * ny
-    skip, leaf, rectangle = np.zeros(2 * count - 1, np.int64), np.full(2 * count - 1, -1), np.zeros((2 * count - 1, 4), np.int64)
+    skip, leaf, level = (np.full(2 * count - 1, -1) for _ in range(3))
+    rectangle = np.zeros((2 * count - 1, 4), np.int64)
     node, area = np.array([0]), np.array([[0, nx - 1, 0, ny - 1]])
     while len(node):
-        rectangle[node] = area
+        rectangle[node], level[node] = area, level.max() + 1
         sides = area[:, 1::2] - area[:, ::2] + 1
         skip[node] = node + 2 * sides.prod(axis=1) - 1
         single = (sides == 1).all(axis=1)
@@ -71,7 +73,7 @@ def halved_grid(nx: int, ny: int, dx: float, dy: float) -> Tree:
         left[row, low + 1], right[row, low] = middle, middle + 1
         leaves = (left[:, 1::2] - left[:, ::2] + 1).prod(axis=1)
         node, area = np.concatenate([node + 1, node + 2 * leaves]), np.concatenate([left, right])
-    return Tree(skip, leaf, rectangle)
+    return Tree(skip, leaf, level, rectangle)
 
 
 def stretches(start: Integers, size: Integers) -> tuple[Integers, Integers]:
@@ -152,26 +154,74 @@ def layered_of(bodies: list[Body], numbering: Numbering, size: int, real: Any, a
     soft = [(body, index) for body, index in zip(bodies, numbering.bodies, strict=True) if not body.shape.rigid]
     if not soft:
         return None
-    trees = [(tree_of(body.shape), body.shape, index) for body, index in soft]
-    nodes = [len(tree.skip) for tree, _, index in trees for _ in index]
-    root, total = np.cumsum([0, *nodes]), sum(nodes)
-    skip, particle = np.zeros(total, np.int64), np.full(total, -1)
-    rectangle, ends = np.zeros((total, 4), np.int64), np.zeros((total, 6), np.int64)
-    lattice, radius, t = np.zeros((len(nodes), 3)), np.zeros(size), 0
-    for tree, shape, index in trees:
-        inner = tree.leaf < 0
+    nodes, radius = [0], np.zeros(size)
+    skips, particles, levels, lattices, patches = [], [], [], [], []
+    for body, index in soft:
+        shape, tree = body.shape, tree_of(body.shape)
+        cloth = len(tree.rectangle) > 0
+        found, lattice = (patches_of(shape, tree), lattice_of(shape)) if cloth else (NO_PATCHES, (1.0, 1.0, 0.0))
         for own in index:
-            part = slice(root[t], root[t + 1])
-            skip[part] = tree.skip + root[t]
-            particle[part] = np.where(inner, -1, own[tree.leaf])
+            skips.append(tree.skip + nodes[-1])
+            particles.append(np.where(tree.leaf < 0, -1, own[tree.leaf]))
+            levels.append(tree.level)
+            patches.append(found.moved(nodes[-1]))
+            lattices.append((*lattice, float(np.dtype(real).type(shape.radius))))
             radius[own] = shape.radius
-            if len(tree.rectangle):
-                rectangle[part], ends[part], lattice[t] = tree.rectangle, ends_of(shape, tree) + root[t], lattice_of(shape)
-            t += 1
+            nodes.append(nodes[-1] + len(tree.skip))
+    particle, level = np.concatenate(particles), np.concatenate(levels)
+    inner = np.flatnonzero(particle < 0)
+    node, rectangle, edges, ends = (np.concatenate(column) for column in zip(*patches, strict=True))
+    row = np.full(len(particle), -1)
+    row[node] = np.arange(len(node))
     apart, partner = exclusions(soft, size, attached)
-    return Layered(*(gate(array, np.int64) for array in (root, skip, particle)), gate(np.zeros((total, 4)), np.float64),
-                   gate(rectangle, np.int64), gate(ends, np.int64), gate(np.zeros((total, 12)), np.float64),
-                   gate(lattice, np.float64), gate(radius, real), gate(apart, np.int64), gate(partner, np.int64))
+    return Layered(root=gate(nodes, np.int64), skip=gate(np.concatenate(skips), np.int64), particle=gate(particle, np.int64),
+                   leaf=gate(np.flatnonzero(particle >= 0), np.int64),
+                   inner=gate(inner[np.argsort(-level[inner], kind="stable")], np.int64),
+                   sphere=gate(np.zeros((len(particle), 4)), np.float64), row=gate(row, np.int64), node=gate(node, np.int64),
+                   rectangle=gate(rectangle, np.int64), bound=gate(np.zeros((len(node), 12)), np.float64),
+                   start=gate(np.cumsum([0, *edges.ravel()]), np.int64), ends=gate(ends.T, np.int64),
+                   lattice=gate(lattices, np.float64), radius=gate(radius, real),
+                   apart=gate(apart, np.int64), partner=gate(partner, np.int64))
+
+
+class Patches(NamedTuple):
+    """The nodes of a cloth's tree that have bounds, in ascending order, and the edges of those whose children have none."""
+
+    node: Integers              # (R,)
+    rectangle: Integers         # (R, 4)
+    edges: Integers             # (R, 2) how many of them along i, along j
+    ends: Integers              # (U, 2) leaves at tail and head
+
+    def moved(self, first: int) -> "Patches":
+        """The same of a tree whose nodes begin at `first`."""
+        return Patches(self.node + first, self.rectangle, self.edges, self.ends + first)
+
+
+NO_PATCHES = Patches(*(np.zeros(shape, np.int64) for shape in (0, (0, 4), (0, 2), (0, 2))))
+
+
+def patches_of(shape: Shape, tree: Tree) -> Patches:
+    """Nodes with bounds: those of more than PATCH particles and their children.
+
+    Of the smallest ones the edges that their particles own are listed: those from (i, j) to (i + 1, j), (i, j - 1) and
+    (i, j + 1). Where the cloth ends, an edge that does not exist is the nearest one in its line.
+    """
+    nx, ny = int(shape.layout[1]), int(shape.layout[2])
+    large = tree.skip - np.arange(len(tree.skip)) > 2 * PATCH - 1
+    parents = np.flatnonzero(large)
+    node = np.union1d([0], np.concatenate([parents + 1, tree.skip[parents + 1]]))
+    leaf = np.argsort(tree.leaf)[-nx * ny:]                             # of each particle
+    edges, ends = np.zeros((len(node), 2), np.int64), [np.zeros((0, 2), np.int64)]
+    for row, k in enumerate(node):
+        if large[k]:
+            continue
+        below = tree.leaf[k:tree.skip[k]]
+        i, j = np.divmod(below[below >= 0], ny)
+        along = np.minimum(i, nx - 2) * ny + j
+        across = np.unique(i * ny + np.concatenate([np.maximum(j - 1, 0), np.minimum(j, ny - 2)]).reshape(2, -1))
+        edges[row] = len(np.unique(along)), len(across)
+        ends += [leaf[np.stack([np.unique(along), np.unique(along) + ny], axis=1)], leaf[np.stack([across, across + 1], axis=1)]]
+    return Patches(node, tree.rectangle[node], edges, np.concatenate(ends))
 
 
 def tree_of(shape: Shape) -> Tree:
@@ -188,21 +238,6 @@ def spacing(shape: Shape) -> tuple[float, float]:
     corners = place[0], place[(int(nx) - 1) * int(ny)], place[int(ny) - 1]
     return (float(np.linalg.norm(corners[1] - corners[0])) / (int(nx) - 1),
             float(np.linalg.norm(corners[2] - corners[0])) / (int(ny) - 1))
-
-
-def ends_of(shape: Shape, tree: Tree) -> Integers:
-    """(M, 6) tail and head, as leaves, of the edges that a cloth's leaf (i, j) owns: to (i + 1, j), from (i, j - 1), to (i, j + 1).
-
-    Where the cloth ends, an edge that does not exist is the nearest one in its line.
-    """
-    nx, ny = int(shape.layout[1]), int(shape.layout[2])
-    i, j = np.divmod(np.arange(nx * ny), ny)
-    along, before, after = np.minimum(i, nx - 2), np.maximum(j - 1, 0), np.minimum(j, ny - 2)
-    particles = [along * ny + j, (along + 1) * ny + j, i * ny + before, i * ny + before + 1, i * ny + after, i * ny + after + 1]
-    node = np.argsort(tree.leaf)[-nx * ny:]                             # leaf of each particle
-    result = np.zeros((len(tree.leaf), 6), np.int64)
-    result[node] = node[np.stack(particles, axis=1)]
-    return result
 
 
 def lattice_of(shape: Shape) -> tuple[float, float, float]:
@@ -236,16 +271,16 @@ def exclusions(soft: list[tuple[Body, Integers]], size: int, attached: Integers)
     for body, index in soft:
         never = np.concatenate([body.shape.sticks, near_at_rest(body.shape)])
         pairs.append(index[:, never].reshape(-1, 2))
-    both = np.concatenate(pairs)
-    both = np.unique(np.concatenate([both, both[:, ::-1]]), axis=0)
-    return np.searchsorted(both[:, 0], np.arange(size + 1)), np.ascontiguousarray(both[:, 1])
+    first, second = np.concatenate(pairs).T
+    both = np.unique(np.concatenate([first * size + second, second * size + first]))
+    return np.searchsorted(both, size * np.arange(size + 1)), both % size
 
 
 def near_at_rest(shape: Shape) -> Integers:
     """Pairs (A, 2) of particles whose spheres overlap at rest."""
     if shape.radius == 0:
         return np.zeros((0, 2), np.int64)
-    from scipy.spatial import cKDTree       # imported here: only radii call for it
+    from scipy.spatial import cKDTree  # imported here: it takes time, and only radii call for it
 
     place = shape.positions
     pairs = cKDTree(place).query_pairs(2 * shape.radius, output_type="ndarray")
@@ -291,7 +326,7 @@ def wrapped(things: Sequence[tuple[Floats, Sequence[Integers], Integers]]) -> Wr
 def node_support(tree: Tree, points: Floats, parts: Sequence[Integers]) -> Integers:
     """(M, 4) support of the smallest sphere about all points below each node."""
     order = tree.leaf[tree.leaf >= 0]                   # leaves as they stand in preorder: those below a node are neighbours
-    rank = np.cumsum(tree.leaf >= 0) - (tree.leaf >= 0)                 # leaves before a node
+    rank: Integers = np.cumsum(tree.leaf >= 0) - (tree.leaf >= 0)       # leaves before a node
     members = np.concatenate([parts[leaf] for leaf in order])
     first = np.cumsum([0, *(len(parts[leaf]) for leaf in order)])
     below = (tree.skip - np.arange(len(tree.skip)) + 1) // 2            # leaves of 2 s - 1 nodes
@@ -309,15 +344,13 @@ def stack_of(*forests: Layered | Wrapped | None) -> Stack:
 
 
 def candidates_of(capacity: int = FIRST_ROOM) -> Candidates:
-    """Room for so many pairs."""
-    return Candidates(*(gate(np.zeros(size), np.int64) for size in (1, capacity, capacity)))
+    """Room for so many pairs, none looked for yet."""
+    return Candidates(gate([-1], np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64))
 
 
 def spheres_of(layered: Layered, margin: float, capacity: int = FIRST_ROOM) -> Spheres:
-    """Contacts between the particles of these trees, none so far and none listed; `margin` in m."""
-    soft = np.zeros(len(layered.radius))
-    soft[layered.particle[layered.particle >= 0]] = 1
-    real = layered.radius.dtype
-    nowhere: Array = np.full((3, len(soft)), np.inf)
-    return Spheres(candidates_of(capacity), gate(nowhere, real), gate(soft, real), margin, layered.radius,
+    """Contacts between the particles of these trees, none looked for yet; `margin` in m."""
+    soft, real = np.zeros(len(layered.radius)), layered.radius.dtype
+    soft[layered.particle[layered.leaf]] = 1
+    return Spheres(candidates_of(capacity), gate(np.zeros((3, len(soft))), real), gate(soft, real), margin, layered.radius,
                    gate(np.zeros(capacity), np.float64), gate(np.zeros(capacity), np.float64))
