@@ -284,6 +284,7 @@ class Meetings(NamedTuple):
     weight: Array               # (6, T) double 1; of each three the sum is 1
     normal: Array               # (3, T) double 1; from the second hull to the first
     gap: Array                  # (T,) double m; normal . (first point - second point) - roundings; negative: penetration
+    push: Array                 # (T,) double m; how far the features have been moved apart in this substep (paper's response)
 
 
 class Layered(NamedTuple):
@@ -433,14 +434,14 @@ class Features(NamedTuple):
 
     point: int                  # int 1; FEATURE, BODY or PRINTED: which masses place the point where two features meet
     mass: Array                 # (H,) double kg; of the hull's body
-    push: Array                 # (T,) double m; how far the features of a meeting have been moved apart in this substep
-    push_mixed: Array           # (U,) double m; the same of particles and hulls
+    mass_point: Array           # (J,) double kg; the same of hulls of bodies and of particles
 
 
 class Friction(NamedTuple):
     particle: Array             # (2, n) real 1; static and dynamic
     solid: Array                # (2, K) double 1
     hull: Array                 # (2, H) double 1
+    point: Array                # (2, J) double 1; hulls of bodies and of particles
 
 
 class Restitution(NamedTuple):
@@ -464,6 +465,7 @@ class Effects(NamedTuple):
     meet: Meet | None
     trees: Trees | None
     spheres: Spheres | None
+    points: Hulls | None        # of rigid bodies and of the particles that meet them
     mixed: Mixed | None
     rigid: Rigid | None
     touches: Touches | None

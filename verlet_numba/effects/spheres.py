@@ -29,7 +29,7 @@ def heading(i, j):
 
 
 @kernel
-def meet(previous, spheres):
+def begin_spheres(previous, spheres):
     """A substep begins: nothing is pushed yet, and the overlaps of the candidates are noted."""
     if spheres is None:
         return
@@ -43,7 +43,7 @@ def meet(previous, spheres):
 
 
 @kernel
-def part(position, previous, inverse_mass, spheres):
+def part_spheres(position, previous, inverse_mass, spheres):
     """Move candidates that overlap apart to touch; take back what an earlier pass of this substep gave too much."""
     if spheres is None:
         return

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from verlet_numba.buffers import Candidates, Friction, Spheres
-from verlet_numba.effects.spheres import deepest, heading, meet, part, rub_spheres, touching_spheres
+from verlet_numba.effects.spheres import begin_spheres, deepest, heading, part_spheres, rub_spheres, touching_spheres
 
 N = 40
 
@@ -26,10 +26,10 @@ class Case:
         candidates = Candidates(np.array([len(self.pairs)]), first[moves], second[moves])
         self.spheres = Spheres(candidates, np.zeros((3, count), real), np.ones(count, real), 0.0, radius,
                                np.full(len(self.pairs), 9.0), np.full(len(self.pairs), 9.0))
-        meet(self.previous, self.spheres)
+        begin_spheres(self.previous, self.spheres)
 
     def separate(self):
-        part(self.position, self.previous, self.inverse_mass, self.spheres)
+        part_spheres(self.position, self.previous, self.inverse_mass, self.spheres)
 
     def rub(self):
         rub_spheres(self.position, self.previous, self.inverse_mass, self.spheres, self.friction)
@@ -121,7 +121,7 @@ def two(distance, radius=0.1, inverse_mass=(1.0, 1.0), velocity=(0.0, 0.0, 0.0),
     case.position[:, 0], case.position[:, 1] = 0, distance * np.array(direction)
     case.previous[:] = case.position
     case.previous[:, 1] -= velocity
-    meet(case.previous, case.spheres)
+    begin_spheres(case.previous, case.spheres)
     return case
 
 
@@ -217,8 +217,8 @@ def test_no_friction_where_nothing_presses():
 
 
 def test_nothing_is_nothing():
-    meet(None, None)
-    part(None, None, None, None)
+    begin_spheres(None, None)
+    part_spheres(None, None, None, None)
     rub_spheres(None, None, None, None, None)
     case = Case(1)
     rub_spheres(case.position, case.previous, case.inverse_mass, case.spheres, None)
