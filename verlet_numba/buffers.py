@@ -169,6 +169,7 @@ class Contacts(NamedTuple):
     radius: Array               # (n,) real m; contact radius
     body: Array                 # (n,) int 1; rigid body that answers as a whole, -1: the particle answers alone
     planes_only: Array          # (n,) int 1; 1: the particle's body meets all other colliders as a hull
+    near: Array                 # (B,) int 1; scratch: which of a batch of particles are near
     margin: float               # double m; how near a particle must come to be listed
     listed: Array               # (1,) int 1; how many contacts there are
     particle: Array             # (L,) int 1

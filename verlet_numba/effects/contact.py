@@ -15,8 +15,6 @@ from verlet_numba.buffers import BOX, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
 from verlet_numba.physics.solids import box, cylinder, plane, sphere
 
-BATCH = 128
-
 
 @formula
 def surface(kind, extent, x, y, z):
@@ -59,22 +57,24 @@ def find_contacts(position, previous, inverse_mass, contact):
 
 @kernel
 def list_contacts(position, previous, inverse_mass, contact, s):
-    """List the contacts of solid s, passing over batches of particles that are far from it. False: no room."""
+    """List the contacts of solid s: batch by batch of particles, first those that a coarse test finds near. False: no room."""
     solids, radii, margin, room = contact.solids, contact.radius, contact.margin, contact.particle.size
     kind, extent, reach = solids.kind[s], extent_of(solids.extent, s), solids.reach[s]
     pose, earlier = pose_of(solids.origin, solids.rotation, s), pose_of(solids.origin_before, solids.rotation_before, s)
-    particle, solid, push, planes_only = contact.particle, contact.solid, contact.push, contact.planes_only
+    particle, solid, push, planes_only, near = contact.particle, contact.solid, contact.push, contact.planes_only, contact.near
     normal, bound, anchor = contact.normal, contact.bound, contact.anchor
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     c = contact.listed[0]
-    for first in range(0, inverse_mass.size, BATCH):
-        last = min(inverse_mass.size, first + BATCH)
-        if not any_near(x[first:last], y[first:last], z[first:last], radii[first:last], kind, extent, pose, reach, margin):
+    for first in range(0, inverse_mass.size, near.size):
+        last = min(inverse_mass.size, first + near.size)
+        if not any_near(x[first:last], y[first:last], z[first:last], radii[first:last], kind, extent, pose, reach, margin, near):
             continue
         for k in range(first, last):
+            if not near[k - first] or not inverse_mass[k] > 0 or (planes_only[k] and kind != PLANE):
+                continue
             px, py, pz = inward(x[k], y[k], z[k], pose)
             gap, nx, ny, nz = surface(kind, extent, px, py, pz)
-            if gap - radii[k] >= margin or not inverse_mass[k] > 0 or (planes_only[k] and kind != PLANE):
+            if gap - radii[k] >= margin:
                 continue
             if c == room:
                 return False
@@ -93,19 +93,21 @@ def list_contacts(position, previous, inverse_mass, contact, s):
 
 
 @kernel
-def any_near(x, y, z, radii, kind, extent, pose, reach, margin):
-    """Whether any particle of a batch comes near a solid: below its plane, or within the sphere that holds it."""
-    near = 0
+def any_near(x, y, z, radii, kind, extent, pose, reach, margin, near):
+    """Mark the particles of a batch that come near a solid: below its plane, or within the sphere that holds it."""
+    found = 0
     if kind == PLANE:
         nx, ny, nz = outward(extent[0], extent[1], extent[2], pose)
         bound = extent[3] + margin + nx * pose[0] + ny * pose[1] + nz * pose[2]
         for k in range(x.size):
-            near += nx * x[k] + ny * y[k] + nz * z[k] < bound + radii[k]
+            near[k] = nx * x[k] + ny * y[k] + nz * z[k] < bound + radii[k]
+            found += near[k]
     else:
         for k in range(x.size):
             dx, dy, dz, far = x[k] - pose[0], y[k] - pose[1], z[k] - pose[2], reach + margin + radii[k]
-            near += dx * dx + dy * dy + dz * dz < far * far
-    return near > 0
+            near[k] = dx * dx + dy * dy + dz * dz < far * far
+            found += near[k]
+    return found > 0
 
 
 @formula

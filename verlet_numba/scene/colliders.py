@@ -24,6 +24,7 @@ from verlet_numba.scene.schema_colliders import BaseCollider
 
 ROOM_WALLS = [(axis, side) for axis in range(3) for side in (-1.0, 1.0)]
 MARGIN = 0.05           # of the shortest stick: how near a particle is listed, since relaxation may still bring it in
+BATCH = 128             # particles that are looked at together
 FIRST_ROOM = 64         # contacts; buffers grow as needed
 
 
@@ -126,7 +127,7 @@ def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, 
         return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
     return Contacts(solids_of(scene)[1], gate(radius, real), gate(belongs if whole else np.full(size, -1), np.int64),
-                    gate(belongs >= 0, np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
+                    gate(belongs >= 0, np.int64), gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
                     gate(np.zeros(size), np.float64), gate(np.zeros(size), np.int64),
                     gate(np.zeros(size), np.float64), gate(np.full(size, -2), np.int64))
 
