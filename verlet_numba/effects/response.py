@@ -14,7 +14,7 @@ from verlet_numba.effects.contact import pose_of
 from verlet_numba.effects.touch import COLLIDERS
 from verlet_numba.kernels.islands import sort_islands
 from verlet_numba.physics.friction import held
-from verlet_numba.physics.pose import inward, outward, turn
+from verlet_numba.physics.pose import inward, outward, rotation
 from verlet_numba.physics.rigid import across, cross, response, times_symmetric
 
 SWEEPS = 16                 # over an island, at most
@@ -332,23 +332,22 @@ def displace(position, inverse_mass, rigid):
     if rigid is None:
         return
     x, y, z = position[0], position[1], position[2]
-    first, stride, size, order = rigid.first, rigid.stride, rigid.size, rigid.order
+    first, stride, size, parent = rigid.first, rigid.stride, rigid.size, rigid.parent
     twist, moved, mass = rigid.twist, rigid.moved, rigid.mass
-    for i in range(rigid.touched[0]):
-        e = order[i]
+    for e in range(parent.size):
+        if parent[e] < 0:
+            continue
         px, py, pz, ox, oy, oz = twist[e, 0], twist[e, 1], twist[e, 2], twist[e, 3], twist[e, 4], twist[e, 5]
         if px == py == pz == ox == oy == oz == 0.0:
             continue
         cx, cy, cz = mass[e, 1], mass[e, 2], mass[e, 3]
-        ax, ay, az = turn(1.0, 0.0, 0.0, ox, oy, oz, 1.0)
-        bx, by, bz = turn(0.0, 1.0, 0.0, ox, oy, oz, 1.0)
-        ex, ey, ez = turn(0.0, 0.0, 1.0, ox, oy, oz, 1.0)
+        xx, xy, xz, yx, yy, yz, zx, zy, zz = rotation(ox, oy, oz)
         for k in range(first[e], first[e] + size[e] * stride[e], stride[e]):
             if inverse_mass[k] > 0:
                 rx, ry, rz = x[k] - cx, y[k] - cy, z[k] - cz
-                x[k] = cx + px + (ax * rx + bx * ry + ex * rz)
-                y[k] = cy + py + (ay * rx + by * ry + ey * rz)
-                z[k] = cz + pz + (az * rx + bz * ry + ez * rz)
+                x[k] = cx + px + (xx * rx + xy * ry + xz * rz)
+                y[k] = cy + py + (yx * rx + yy * ry + yz * rz)
+                z[k] = cz + pz + (zx * rx + zy * ry + zz * rz)
         mass[e, 1], mass[e, 2], mass[e, 3] = cx + px, cy + py, cz + pz
         for column in range(6):
             moved[e, column] += twist[e, column]
@@ -370,7 +369,7 @@ def rebound(friction, rigid, touches):
         line[t, 9], line[t, 10], line[t, 11] = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
-        for _ in range(sweeps_of(end - begin)):
+        for _ in range(SWEEPS if end - begin <= FEW_TOUCHES else 1):
             change = largest = 0.0
             for o in range(begin, end):
                 t = order[o]
@@ -403,9 +402,10 @@ def kick_back(position, previous, inverse_mass, rigid):
     if rigid is None:
         return
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
-    first, stride, size, order, kick, mass = rigid.first, rigid.stride, rigid.size, rigid.order, rigid.kick, rigid.mass
-    for i in range(rigid.touched[0]):
-        e = order[i]
+    first, stride, size, parent, kick, mass = rigid.first, rigid.stride, rigid.size, rigid.parent, rigid.kick, rigid.mass
+    for e in range(parent.size):
+        if parent[e] < 0:
+            continue
         px, py, pz, ox, oy, oz = kick[e, 0], kick[e, 1], kick[e, 2], kick[e, 3], kick[e, 4], kick[e, 5]
         if px == py == pz == ox == oy == oz == 0.0:
             continue

@@ -141,10 +141,11 @@ def weigh(position, previous, inverse_mass, rigid):
     if rigid is None:
         return
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
-    first, stride, size, order, mass, step = rigid.first, rigid.stride, rigid.size, rigid.order, rigid.mass, rigid.step
+    first, stride, size, parent, mass, step = rigid.first, rigid.stride, rigid.size, rigid.parent, rigid.mass, rigid.step
     twist, moved, kick = rigid.twist, rigid.moved, rigid.kick
-    for i in range(rigid.touched[0]):
-        e = order[i]
+    for e in range(parent.size):        # in their own order: neighbours share lines of the cache
+        if parent[e] < 0:
+            continue
         begin, by = first[e], stride[e]
         weighed = weigh_one(x, y, z, u, v, w, inverse_mass, begin, begin + size[e] * by, by)
         for column in range(10):

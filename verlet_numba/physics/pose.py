@@ -37,3 +37,17 @@ def outward(x, y, z, pose):
     return (pose[3] * x + pose[4] * y + pose[5] * z,
             pose[6] * x + pose[7] * y + pose[8] * z,
             pose[9] * x + pose[10] * y + pose[11] * z)
+
+
+@formula
+def rotation(x, y, z):
+    """The matrix, row by row, that turns about the vector (x, y, z) by its length [rad] (Rodrigues)."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle == 0.0:
+        return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    x, y, z, c, s = x / angle, y / angle, z / angle, math.cos(angle), math.sin(angle)
+    half = math.sin(0.5 * angle)
+    t = 2.0 * half * half               # 1 - c without cancellation
+    return (c + t * x * x, t * x * y - s * z, t * x * z + s * y,
+            t * x * y + s * z, c + t * y * y, t * y * z - s * x,
+            t * x * z - s * y, t * y * z + s * x, c + t * z * z)
