@@ -23,7 +23,7 @@ from verlet_numba.scene.body import Body
 from verlet_numba.scene.numbering import number
 from verlet_numba.scene.sphere_trees import candidates_of, layered_of, stack_of
 
-STUDY, RESULTS = "self-collision", Path(__file__).parent / "results"
+STUDY, RESULTS = "detection", Path(__file__).parent / "results"
 SIDES = (40, 80, 160)
 THICKNESS, MARGIN = 0.4, 0.1        # of the spacing
 EXPONENT = 1.0                      # of the number of particles
@@ -86,7 +86,8 @@ def measure(quick: bool) -> Iterator[Figure]:
                 yield figure(STUDY, f"{slope.__name__} {side} x {side}", how, "us", samples * 1e6)
             # The least time of each is what others on the machine disturb least.
             exponent = np.polyfit(np.log([side**2 for side in SIDES]), np.log(times.min(axis=1)), 1)[0]
-            yield figure(STUDY, f"{slope.__name__}, growth in particles", how, "", [exponent], at_most=EXPONENT if bounded else None)
+            bar = EXPONENT if bounded else None
+            yield figure(STUDY, f"{slope.__name__}, exponent of the growth", how, "1", [exponent], at_most=bar)
 
 
 @click.command()
