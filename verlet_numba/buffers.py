@@ -286,6 +286,7 @@ class Meetings(NamedTuple):
     normal: Array               # (3, T) double 1; from the second hull to the first
     gap: Array                  # (T,) double m; normal . (first point - second point) - roundings; negative: penetration
     push: Array                 # (T,) double m; how far the features have been moved apart in this substep (paper's response)
+    give: Array                 # (2, T) double 1/kg; how they give way: sum of w c^2 over their particles
 
 
 class Layered(NamedTuple):

@@ -16,35 +16,35 @@ from verlet_numba.physics.friction import held
 
 
 @kernel
-def begin_features(meet, features):
-    """Nothing has been pushed yet in this substep."""
+def begin_features(inverse_mass, meet, hulls, features):
+    """Nothing has been pushed yet in this substep; how the features give way."""
     if features is None or meet is None:
         return
-    meet.meetings.push[:meet.meetings.listed[0]] = 0.0
-
-
-@inlined
-def weight_of(inverse_mass, particle, corner, weight, m, side):
-    """s = sum w c^2 of the feature of meeting m on the first (side 0) or second (3) hull: the inverse of its mass; 0: fixed."""
-    s = 0.0
-    for e in range(side, side + 3):
-        k = particle[corner[e, m]]
-        if k >= 0:
-            s += inverse_mass[k] * weight[e, m] * weight[e, m]
-    return s
+    corner, weight, particle = meet.meetings.corner, meet.meetings.weight, hulls.particle
+    push, give = meet.meetings.push, meet.meetings.give
+    for m in range(meet.meetings.listed[0]):
+        push[m] = 0.0
+        for side in range(2):
+            s = 0.0
+            for e in range(3 * side, 3 * side + 3):
+                k = particle[corner[e, m]]
+                if k >= 0:
+                    s += inverse_mass[k] * weight[e, m] * weight[e, m]
+            give[side, m] = s
 
 
 @inlined
 def point_of(x, y, z, corners, particle, corner, weight, m, side):
-    """The contact point of a feature, where its particles are now."""
+    """The contact point of meeting m on the first (side 0) or second (3) hull, where its particles are now."""
     px = py = pz = 0.0
     for e in range(side, side + 3):
         q, c = corner[e, m], weight[e, m]
-        k = particle[q]
-        if k >= 0:
-            px, py, pz = px + c * x[k], py + c * y[k], pz + c * z[k]
-        else:
-            px, py, pz = px + c * corners[0, q], py + c * corners[1, q], pz + c * corners[2, q]
+        if c != 0.0:
+            k = particle[q]
+            if k >= 0:
+                px, py, pz = px + c * x[k], py + c * y[k], pz + c * z[k]
+            else:
+                px, py, pz = px + c * corners[0, q], py + c * corners[1, q], pz + c * corners[2, q]
     return px, py, pz
 
 
@@ -53,7 +53,7 @@ def shift(x, y, z, inverse_mass, particle, corner, weight, m, side, s, dx, dy, d
     """Move a feature so that its point moves by d (P20)."""
     for e in range(side, side + 3):
         k = particle[corner[e, m]]
-        if k >= 0 and s > 0.0:
+        if weight[e, m] != 0.0 and k >= 0 and s > 0.0:
             f = inverse_mass[k] * weight[e, m] / s
             x[k] += f * dx
             y[k] += f * dy
@@ -80,7 +80,7 @@ def part_features(position, inverse_mass, meet, hulls, features, which):
     x, y, z = position[0], position[1], position[2]
     corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
     one, other, corners, particle, rounding = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, hulls.rounding
-    push, point, mass = meet.meetings.push, features.point, features.mass if which == HULLS else features.mass_point
+    push, give, point, mass = meet.meetings.push, meet.meetings.give, features.point, features.mass if which == HULLS else features.mass_point
     for m in range(meet.meetings.listed[0]):
         g, h = one[pair[m]], other[pair[m]]
         nx, ny, nz = normal[0, m], normal[1, m], normal[2, m]
@@ -89,8 +89,7 @@ def part_features(position, inverse_mass, meet, hulls, features, which):
         depth = rounding[g] + rounding[h] - (nx * (px - qx) + ny * (py - qy) + nz * (pz - qz))
         if depth <= 0.0:
             continue
-        sa = weight_of(inverse_mass, particle, corner, weight, m, 0)
-        sb = weight_of(inverse_mass, particle, corner, weight, m, 3)
+        sa, sb = give[0, m], give[1, m]
         if sa + sb == 0.0:
             continue
         da = share_of(point, sa, sb, mass[g], mass[h]) * depth
@@ -108,9 +107,9 @@ def rub_features(position, previous, inverse_mass, meet, hulls, features, fricti
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
     one, other, corners, particle, push = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, meet.meetings.push
+    give = meet.meetings.give
     for m in range(meet.meetings.listed[0]):
-        sa = weight_of(inverse_mass, particle, corner, weight, m, 0)
-        sb = weight_of(inverse_mass, particle, corner, weight, m, 3)
+        sa, sb = give[0, m], give[1, m]
         if push[m] == 0.0 or sa + sb == 0.0:
             continue
         nx, ny, nz = normal[0, m], normal[1, m], normal[2, m]

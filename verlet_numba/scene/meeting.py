@@ -193,7 +193,8 @@ def pairs_of(room: int) -> Pairs:
 
 def meetings_of(room: int) -> Meetings:
     """Room for so many meetings."""
-    return Meetings(whole(1), whole(room), whole(6, room), real_(6, room), real_(3, room), real_(room), real_(room))
+    return Meetings(whole(1), whole(room), whole(6, room), real_(6, room), real_(3, room), real_(room), real_(room),
+                    real_(2, room))
 
 
 def search_of(hulls: int, room: int) -> Search:
