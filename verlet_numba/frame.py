@@ -32,7 +32,9 @@ from verlet_numba.effects.response import (
     shove,
 )
 from verlet_numba.effects.restitution import bounce, foresee
-from verlet_numba.effects.touch import HULLS, begin_touches, touch_colliders, touch_hulls, weigh
+from verlet_numba.effects.soft import find_mixed, find_soft
+from verlet_numba.effects.spheres import begin_spheres, deepest, part_spheres, rub_spheres, touching_spheres
+from verlet_numba.effects.touch import HULLS, MIXED, begin_touches, touch_colliders, touch_hulls, weigh
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
 from verlet_numba.kernels.observe import keep, observe, record, record_velocity
@@ -50,9 +52,11 @@ def advance(world, frames, budget):
     Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
-    particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided, effects, solver, observed, snapshot, clock = world
+    particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided = world[:8]
+    effects, solver, observed, snapshot, clock = world[8:]
     position, previous, inverse_mass, acceleration = particles
-    gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, features, friction, restitution = effects
+    gravity, wind, drag, damping, carried, moving = effects[:6]
+    contact, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution = effects[6:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -62,7 +66,8 @@ def advance(world, frames, budget):
                 budget -= 1
                 end = (clock[NUMBER] + 1) * h
                 if clock[SUBSTEP] == substeps - 1:
-                    keep(position, previous, snapshot, touching(contact) + pushing(touches, features, meet))
+                    contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
+                    keep(position, previous, snapshot, contacts)
                 fall(acceleration, gravity)
                 blow(position, previous, acceleration, h, wind)
                 resist(position, previous, acceleration, h, drag)
@@ -72,28 +77,38 @@ def advance(world, frames, budget):
                 move(contact, end, moving)
                 move_hulls(hulls, contact, moving)
                 gather(position, hulls)
+                gather(position, points)
                 clock[STAGE] = INTEGRATED
-            if not find_contacts(position, previous, inverse_mass, contact) or not find_meetings(hulls, meet):
+            if not (find_contacts(position, previous, inverse_mass, contact) and find_meetings(hulls, meet)     # (P11 to P17)
+                    and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
                 return FULL
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
             touch_hulls(meet, hulls, friction, rigid, touches, HULLS)
+            touch_hulls(mixed, points, friction, rigid, touches, MIXED)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
             recall_colliders(contact, rigid, touches)
             recall_hulls(meet, rigid, touches, HULLS)
+            recall_hulls(mixed, rigid, touches, MIXED)
             begin_features(meet, features)
+            begin_features(mixed, features)
+            begin_spheres(previous, spheres)
             forget(runs_softness)
             forget(sticks_softness)
             remember(position, collided)
             for again in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
-                part_features(position, inverse_mass, meet, hulls, features)
+                part_spheres(position, previous, inverse_mass, spheres)         # (P22)
+                part_features(position, inverse_mass, meet, hulls, features, HULLS)    # (P19 to P21)
+                part_features(position, inverse_mass, mixed, points, features, MIXED)   # (P23)
                 if again:
                     gather(position, hulls)
+                    gather(position, points)
                 aim_colliders(position, contact, rigid, touches, clock[NUMBER], h)
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
+                aim_hulls(mixed, points, contact, rigid, touches, MIXED, clock[NUMBER], h)
                 respond(friction, rigid, touches)
                 begin_pass(again, rigid, touches)
                 shove(friction, rigid, touches)
@@ -107,17 +122,21 @@ def advance(world, frames, budget):
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)
             keep_hulls(meet, rigid, touches, HULLS)
+            keep_hulls(mixed, rigid, touches, MIXED)
             rebound(friction, rigid, touches)
             kick_back(position, previous, inverse_mass, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word
-            rub_features(position, previous, inverse_mass, meet, hulls, features, friction)
+            rub_features(position, previous, inverse_mass, meet, hulls, features, friction, HULLS)
+            rub_features(position, previous, inverse_mass, mixed, points, features, friction, MIXED)
+            rub_spheres(position, previous, inverse_mass, spheres, friction)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
         f = clock[FRAME]
         sound = observe(frames.measures[f], position, snapshot, observed, h)
-        frames.measures[f, PENETRATION] = max(penetration(snapshot.position, inverse_mass, contact),
-                                              depth_of_hulls(snapshot.position, meet, hulls))
+        frames.measures[f, PENETRATION] = max(
+            penetration(snapshot.position, inverse_mass, contact), depth_of_hulls(snapshot.position, meet, hulls),
+            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points))
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
         if not sound:

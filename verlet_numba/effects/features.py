@@ -11,7 +11,7 @@ import math
 
 from verlet_numba._jit import inlined, kernel
 from verlet_numba.buffers import FEATURE, PRINTED
-from verlet_numba.effects.touch import grip_between
+from verlet_numba.effects.touch import HULLS, grip_between
 from verlet_numba.physics.friction import held
 
 
@@ -20,7 +20,7 @@ def begin_features(meet, features):
     """Nothing has been pushed yet in this substep."""
     if features is None or meet is None:
         return
-    features.push[:meet.meetings.listed[0]] = 0.0
+    meet.meetings.push[:meet.meetings.listed[0]] = 0.0
 
 
 @inlined
@@ -73,14 +73,14 @@ def share_of(point, sa, sb, ma, mb):
 
 
 @kernel
-def part_features(position, inverse_mass, meet, hulls, features):
+def part_features(position, inverse_mass, meet, hulls, features, which):
     """Move the features of every meeting that penetrates until they touch, along its normal."""
     if features is None or meet is None:
         return
     x, y, z = position[0], position[1], position[2]
     corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
     one, other, corners, particle, rounding = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, hulls.rounding
-    push, mass, point = features.push, features.mass, features.point
+    push, point, mass = meet.meetings.push, features.point, features.mass if which == HULLS else features.mass_point
     for m in range(meet.meetings.listed[0]):
         g, h = one[pair[m]], other[pair[m]]
         nx, ny, nz = normal[0, m], normal[1, m], normal[2, m]
@@ -101,13 +101,13 @@ def part_features(position, inverse_mass, meet, hulls, features):
 
 
 @kernel
-def rub_features(position, previous, inverse_mass, meet, hulls, features, friction):
+def rub_features(position, previous, inverse_mass, meet, hulls, features, friction, which):
     """Take back sliding of the features that were pushed, after the last pass, within Coulomb's share of the push."""
     if features is None or meet is None or friction is None:
         return
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
-    one, other, corners, particle, push = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, features.push
+    one, other, corners, particle, push = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, meet.meetings.push
     for m in range(meet.meetings.listed[0]):
         sa = weight_of(inverse_mass, particle, corner, weight, m, 0)
         sb = weight_of(inverse_mass, particle, corner, weight, m, 3)
@@ -123,7 +123,7 @@ def rub_features(position, previous, inverse_mass, meet, hulls, features, fricti
         sx, sy, sz = sx - rise * nx, sy - rise * ny, sz - rise * nz
         slide = math.sqrt(sx * sx + sy * sy + sz * sz)
         if slide > 0.0:
-            static, dynamic = grip_between(friction, one[pair[m]], other[pair[m]])
+            static, dynamic = grip_between(friction, which, one[pair[m]], other[pair[m]])
             back = held(slide, push[m], static, dynamic)
             fa, fb = -back * sa / (sa + sb), back * sb / (sa + sb)
             shift(x, y, z, inverse_mass, particle, corner, weight, m, 0, sa, fa * sx, fa * sy, fa * sz)

@@ -71,9 +71,9 @@ def depth_of_hulls(position, meet, hulls):
 
 
 @kernel
-def pushing(touches, features, meet):
-    """The number of contacts of bodies that have pushed in this substep."""
-    return pushing_touches(touches) + pushing_features(features, meet)
+def pushing(touches, features, meet, mixed):
+    """The number of contacts of hulls and of rigid bodies that have pushed in this substep."""
+    return pushing_touches(touches) + pushing_features(features, meet) + pushing_features(features, mixed)
 
 
 @kernel
@@ -81,7 +81,7 @@ def pushing_touches(touches):
     if touches is None:
         return 0
     pushed = 0
-    for t in range(touches.until[-1]):
+    for t in range(touches.until[0], touches.until[-1]):        # those with colliders count as contacts
         pushed += touches.given[t, 0] > 0.0
     return pushed
 
@@ -92,5 +92,5 @@ def pushing_features(features, meet):
         return 0
     pushed = 0
     for m in range(meet.meetings.listed[0]):
-        pushed += features.push[m] > 0.0
+        pushed += meet.meetings.push[m] > 0.0
     return pushed

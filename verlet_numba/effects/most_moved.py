@@ -21,7 +21,7 @@ def choose_lists(position, collided, graph):
     if collided is None:
         return
     x, y, z, u, v, w = position[0], position[1], position[2], collided.before[0], collided.before[1], collided.before[2]
-    first, bucket, stride, particles, moved = graph.first, graph.bucket, graph.stride, graph.particles, collided.moved
+    first, bucket, stride, particles, moved = graph.body[0], graph.bucket, graph.stride, graph.particles, collided.moved
     for b in range(first.size):
         by, most = stride[bucket[b]], 0.0
         moved[b] = -1

@@ -184,7 +184,7 @@ def link(rigid, touches):
     """Sort the touches by island; nothing has been given yet."""
     if rigid is None:
         return
-    touches.islands[0] = sort_islands(touches.first, touches.second, touches.until[-1], rigid.size.size - 1, rigid.parent,
+    touches.islands[0] = sort_islands(touches.first, touches.second, touches.until[-1], rigid.mass, rigid.parent,
                                       touches.label, touches.order, touches.island)
 
 

@@ -106,7 +106,7 @@ def touch_hulls(meet, hulls, friction, rigid, touches, which):
         if b != world:
             enter(parent, order, touched, b)
         first[t], second[t], source[t] = (b, a, m) if a == world else (a, b, m)
-        answer[t, 2], answer[t, 3] = grip_between(friction, g, h)
+        answer[t, 2], answer[t, 3] = grip_between(friction, which, g, h)
         answer[t, 4] = 0.0
         t += 1
     touches.until[which:] = t
@@ -127,11 +127,12 @@ def entity_of(b, k, bodies, entity, leads, touched, world):
 
 
 @kernel
-def grip_between(friction, g, h):
-    """Static and dynamic friction of hull g on hull h: the geometric mean of the two materials."""
+def grip_between(friction, which, g, h):
+    """Static and dynamic friction of hull g on hull h of the HULLS or the MIXED: the geometric mean of the two materials."""
     if friction is None:
         return 0.0, 0.0
-    return (math.sqrt(friction.hull[0, g] * friction.hull[0, h]), math.sqrt(friction.hull[1, g] * friction.hull[1, h]))
+    own = friction.hull if which == HULLS else friction.point
+    return math.sqrt(own[0, g] * own[0, h]), math.sqrt(own[1, g] * own[1, h])
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba._jit import formula, kernel
+from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.buffers import Hulls, Narrow
 from verlet_numba.kernels.gjk import APART, MET, gjk
 from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
@@ -121,7 +121,7 @@ def met(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, n,
     return kind == SOLID, a, b, c, d, e, f, nx, ny, nz, distance, u, v, w
 
 
-@kernel
+@inlined
 def recall(points, neighbours, neighbour, seen, sa, na, ra, sb, nb, rb, noise, bound, face, i, vertex, label):
     """What pair i learnt: what became of it, its six columns, and as `feature`.
 

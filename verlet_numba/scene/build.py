@@ -55,8 +55,8 @@ def build(scene: Scene, bodies: list[Body]) -> Model:
     moves = [np.broadcast_to(~body.pinned, index.shape) for body, index in zip(bodies, numbering.bodies, strict=True)]
     inverse_mass = spread(numbering, [move / mass for move, mass in zip(moves, masses, strict=True)], size)
 
-    effects = effects_of(scene, bodies, numbering, inverse_mass, real)
     together = attachments(scene, bodies, numbering)
+    effects = effects_of(scene, bodies, numbering, together, inverse_mass, real)
     ordered = scene.solver.order == "constraint_graph"
     joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real, rigid=not ordered)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
@@ -75,12 +75,13 @@ def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
     """What collisions do to the bodies of a constraint graph."""
     if graph is None:
         return None
-    return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.first), -1), np.int64))
+    return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.bucket), -1), np.int64))
 
 
-def effects_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Effects:
+def effects_of(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
+               real: Any) -> Effects:
     """What the scene calls for, None for everything else."""
-    contact = contact_of(scene, bodies, numbering, inverse_mass, real)
+    contact = contact_of(scene, bodies, numbering, together, inverse_mass, real)
     return Effects(forces.gravity(scene.effects, inverse_mass, real),
                    forces.wind(scene.effects, bodies, numbering, inverse_mass, real),
                    forces.drag(scene.effects, inverse_mass, real),

@@ -137,7 +137,7 @@ def margin(bodies: list[Body]) -> float:
     return MARGIN * float(min(lengths[lengths > 0], default=0.0))
 
 
-def room(capacity: int) -> tuple[Array, ...]:
+def room(capacity: int) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Empty contact buffers: particle, solid, normal, bound, anchor, push."""
     return (gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros((3, capacity)), np.float64),
             gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64))

@@ -81,3 +81,11 @@ def laid_out(pieces: list[Piece]) -> Hulls:
                  gate(corner, np.float64), gate(centre, np.float64), gate(numbers[1], np.int64), gate(local, np.float64),
                  gate(reach, np.float64), gate(rounding, np.float64), gate(np.full(len(pieces), -1), np.int64),
                  gate(np.zeros(1), np.int64), gate(np.zeros(0), np.int64))
+
+
+def hulls_and_particles(bodies: list[Body], numbering: Numbering, particles: Integers, radius: Floats) -> Hulls:
+    """Hulls of rigid bodies, and behind them one of a single corner for each of these particles; radius (n,) m."""
+    pieces = [*bodies_pieces(bodies, numbering)]
+    nowhere = np.zeros((3, 1))
+    pieces += [Piece(-1, -1, np.array([k]), nowhere, nowhere, float(radius[k])) for k in particles]
+    return laid_out(pieces)

@@ -12,16 +12,19 @@ from verlet_numba.scene.schema import Scene
 
 
 def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, hulls: Hulls | None,
-                real: Any) -> Friction | None:
-    """Coefficients of particles (2, n), colliders and hulls; None if no two that may meet have any: they meet with sqrt(a b)."""
+                points: Hulls | None, soft: bool, real: Any) -> Friction | None:
+    """Coefficients of particles (2, n), colliders and hulls; they meet with sqrt(a b).
+
+    None if no two that may meet have any. soft: particles of deformable bodies meet each other.
+    """
     default = scene.effects.friction
     pairs = [solid.collider.friction or default for solid in found]
     solid = np.array([[pair.static, pair.dynamic] if pair else [0.0, 0.0] for pair in pairs]).reshape(-1, 2).T
     particle = np.stack([spread(numbering, [body.friction[which] for body in bodies], size) for which in range(2)])
-    if not particle.any() or (hulls is None and not solid.any()):
+    if not particle.any() or (hulls is None and points is None and not soft and not solid.any()):
         return None
-    hull = np.stack([of_hulls(hulls, particle[which], solid[which]) for which in range(2)])
-    return Friction(gate(particle, real), gate(solid, np.float64), gate(hull, np.float64))
+    hull, point = (np.stack([of_hulls(each, particle[which], solid[which]) for which in range(2)]) for each in (hulls, points))
+    return Friction(gate(particle, real), gate(solid, np.float64), gate(hull, np.float64), gate(point, np.float64))
 
 
 def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, hulls: Hulls | None,

@@ -48,3 +48,17 @@ def touches_of(room: int, entities: int) -> Touches:
     """Room for so many touches between entities."""
     numbers = [gate(np.zeros(length), np.int64) for length in (3, 1, room, room, room, room, room + 1, entities)]
     return Touches(*numbers, *(gate(np.zeros((room, columns)), np.float64) for columns in (18, 8, 4)))
+
+
+def with_room(rigid: Rigid, more: int) -> Rigid:
+    """The same bodies with room for so many entities behind them, the world included; none is touched."""
+    bodies = rigid.bodies
+    first, stride, size, reach = (np.concatenate([array[:bodies], np.full(more, value, array.dtype)])
+                                  for array, value in ((rigid.first, 0), (rigid.stride, 1), (rigid.size, 1), (rigid.reach, 0.0)))
+    rigid.entity[:] = -1
+    rigid.touched[:] = 0
+    mass, step, twist, moved, kick = (gate(np.zeros((bodies + more, columns)), np.float64) for columns in (10, 6, 6, 6, 6))
+    return rigid._replace(first=gate(first, np.int64), stride=gate(stride, np.int64), size=gate(size, np.int64),
+                          reach=gate(reach, np.float64), order=gate(np.zeros(bodies + more), np.int64),
+                          parent=gate(np.full(bodies + more, -1), np.int64), mass=mass, step=step, twist=twist, moved=moved,
+                          kick=kick)
