@@ -189,7 +189,7 @@ def link(rigid, touches):
 
 
 @kernel
-def recall_colliders(contact, rigid, touches):
+def recall_colliders(contact, rigid, touches, number):
     """What pushed in the last substep pushes now, to begin with: touches with colliders."""
     if rigid is None:
         return
@@ -198,9 +198,10 @@ def recall_colliders(contact, rigid, touches):
         return
     particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
                                                     touches.source)
+    met = contact.met
     for t in range(touches.until[COLLIDERS]):
         k = particle[source[t]]
-        if keeper[k] == solid[source[t]]:
+        if keeper[k] == solid[source[t]] and met[k] >= number - 1:
             given[t, 0] = kept[k]
 
 

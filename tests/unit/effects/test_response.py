@@ -56,7 +56,7 @@ class Case:
         touch_hulls(e.meet, e.hulls, e.friction, e.rigid, e.touches, HULLS)
         weigh(self.x, self.previous, self.w, e.rigid)
         link(e.rigid, e.touches)
-        recall_colliders(e.contact, e.rigid, e.touches)
+        recall_colliders(e.contact, e.rigid, e.touches, number)
         recall_hulls(e.meet, e.rigid, e.touches, HULLS)
         aim_colliders(self.x, e.contact, e.rigid, e.touches, number, H)
         aim_hulls(e.meet, e.hulls, e.contact, e.rigid, e.touches, HULLS, number, H)
