@@ -122,7 +122,10 @@ def with_damping(a, displacement, rate, h):
 
 @dataclass
 class Twin:
-    """A scene and its bodies, simulated naively. x, previous: (N, 3) m in the order of the file."""
+    """A scene and its bodies, simulated naively. x, previous: (N, 3) m in the order of the file.
+
+    Bodies do not meet each other here, nor rigid ones other colliders than planes and rooms.
+    """
 
     scene: object
     bodies: list
@@ -194,28 +197,32 @@ class Twin:
         self.x, self.previous = 2 * self.x - self.previous + a * h**2, self.x
         self.carry(t + h)
         found = (find_contact(k, self.x[k], self.previous[k], self.radius[k], solid, self.margin, t, h)
-                 for solid in self.solids for k in np.flatnonzero(self.free))
+                 for solid in self.solids for k in np.flatnonzero(self.free) if self.meets(k, solid))
         self.contacts = [contact for contact in found if contact]
         for body in self.whole:
             body.gather()
         self.foresee(a)
         for stick in self.sticks:
             stick.multiplier = 0.0
-        for _ in range(solver.iterations):
+        for iteration in range(solver.iterations):
             self.separate()
             for body in self.whole:
-                body.separate()
+                body.separate(first=iteration == 0)
             for stick in self.sticks:
                 self.relaxed += relax_stick(self.x, self.w, stick, h, solver.tolerance, solver.square_root == "approximate")
             for corners, rest in self.angles:
                 relax_angle(self.x, self.w, corners, rest)
                 self.relaxed += 1
         self.bounce()
-        self.rub()
         for body in self.whole:
-            body.bounce()
-            body.rub()
+            body.keep()
+            body.rebound()
+        self.rub()
         self.number += 1
+
+    def meets(self, k, solid):
+        """Whether a particle meets a solid by itself: rigid bodies meet all but planes with their hulls."""
+        return not self.owner[k].shape.rigid or solid.collider.kind in ("plane", "room")
 
     def carry(self, t):
         for p, body in enumerate(self.owner):
@@ -286,7 +293,7 @@ class Twin:
         gravity = np.array(self.scene.effects.gravity or (0.0, 0.0, 0.0))
         errors = [np.linalg.norm(x[s.j] - x[s.i]) / s.rest - 1 for s in self.observed if s.rest > 0]
         inside = [self.radius[k] - solid.distance(R.T @ (x[k] - o))[0] for solid in self.solids
-                  for o, R in [solid.pose(t)] for k in np.flatnonzero(self.free)]
+                  for o, R in [solid.pose(t)] for k in np.flatnonzero(self.free) if self.meets(k, solid)]
         kinetic, potential = (m * v**2).sum() / 2, -(m * x * gravity).sum()
         return {"kinetic_energy": kinetic, "potential_energy": potential, "total_energy": kinetic + potential,
                 "momentum": (m * v).sum(0), "angular_momentum": (m * np.cross(x, v)).sum(0),

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import null_space
 
-from verlet_numba.effects.response import SETTLED, SWEEPS  # how far the contacts of a rigid body are iterated
+from verlet_numba.effects.response import RECOVERY, SETTLED, SWEEPS
 
 
 def turned(axis, angle):
@@ -146,98 +147,131 @@ def held(slide, push, static, dynamic):
     return dynamic * push / slide
 
 
-def settled(before, after):
-    """Whether a sweep changed impulses, numbers or vectors, by next to nothing."""
-    change = np.abs(np.array(after) - np.array(before)).max(initial=0)
-    return change <= SETTLED * max((np.linalg.norm(impulse) for impulse in after), default=0)
-
-
 class Whole:
-    """A rigid body that answers to its contacts as a whole.
+    """A rigid body that answers to its contacts with colliders as a whole.
 
-    An impulse J at the arm r moves the body by J/M and turns it by I^-1 (r x J). Pushes are those of a lone particle: J w_k.
+    An impulse J [kg m] at the arm r moves the body by J/M and turns it by I^-1 (r x J). Impulses, normal and along the
+    surface, are found by Gauss-Seidel; a substep begins with the normal ones that the last one ended with.
     """
 
     def __init__(self, twin, particles):
         self.twin, self.particles = twin, particles
+        self.kept, self.overlap, self.met = {}, {}, {}      # by particle: collider and impulse; m not given back; substep
+        x = twin.x[particles]
+        self.size = np.linalg.norm(x - x.mean(axis=0), axis=1).max()
 
     def gather(self):
-        """The body's contacts, the last found first, and its mass, centre and inertia where it is."""
+        """The body's contacts, mass, centre and inertia where it is, and the impulses to begin with."""
         twin = self.twin
-        self.contacts = [contact for contact in reversed(twin.contacts) if contact.k in self.particles]
+        self.contacts = [contact for contact in twin.contacts if contact.k in self.particles]
         x, m = twin.x[self.particles], twin.mass[self.particles]
         self.mass, self.centre = m.sum(), m @ x / m.sum()
         inertia = sum(mass * ((r @ r) * np.eye(3) - np.outer(r, r)) for mass, r in zip(m, x - self.centre, strict=True))
         self.inverse_inertia = np.linalg.inv(inertia)
+        for contact in self.contacts:
+            solid, impulse = self.kept.get(contact.k, (None, 0.0))
+            recent = self.met.get(contact.k, -2) >= twin.number - 1
+            contact.impulse = impulse if solid is contact.solid and recent else 0.0
+            contact.grip, contact.kick = np.zeros(3), 0.0
 
-    def arm(self, contact):
-        return self.twin.x[contact.k] - self.centre
+    def answer(self, contact):
+        """Matrix (3, 3) of the displacement of the contact's point by an impulse there, 1/kg."""
+        r = contact.arm
+        K = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
+        return np.eye(3) / self.mass - K @ self.inverse_inertia @ K
 
-    def response(self, contact, direction):
-        """Displacement of the contact's particle along a unit direction by a unit impulse, kg^-1."""
-        lever = np.cross(self.arm(contact), direction)
-        return 1 / self.mass + lever @ self.inverse_inertia @ lever
+    def aim(self, contact):
+        """How far a contact shall rise. What overlapped when they met stays for a while."""
+        twin, n, k = self.twin, contact.normal, contact.k
+        contact.arm, contact.moved = twin.x[k] - self.centre, twin.x[k] - contact.anchor
+        gap, met = contact.height(twin.x), self.met.get(k, -2)
+        standing = 0.0 if contact.rebound > 0 else max(0.0, n @ contact.moved - gap)
+        if met < twin.number - 1:
+            self.overlap[k] = standing
+        elif met < twin.number:
+            self.overlap[k] = min(standing, max(0.0, self.overlap[k] - RECOVERY * self.size * twin.h))
+        else:
+            self.overlap[k] = min(standing, self.overlap[k])
+        self.met[k] = twin.number
+        return -gap - self.overlap[k]
 
-    def twist(self, wanted, given):
-        """Translation and rotation that make every contact rise by what is `wanted`, with pushes `given` never below 0."""
-        shift, turn = np.zeros(3), np.zeros(3)
-        impulses = [push / self.twin.w[contact.k] for push, contact in zip(given, self.contacts, strict=True)]
+    def strike(self, contact, impulse):
+        """The body moves and turns further by an impulse at a contact."""
+        self.shift = self.shift + impulse / self.mass
+        self.turn = self.turn + self.inverse_inertia @ np.cross(contact.arm, impulse)
+
+    def risen(self, contact):
+        return self.shift + np.cross(self.turn, contact.arm)
+
+    def gripped(self, contact, push, slide):
+        """The impulse along the surface that takes back as much of the slide as friction holds under so great a push."""
+        across = null_space(contact.normal[None])
+        wished = contact.grip - across @ np.linalg.solve(across.T @ self.answer(contact) @ across, across.T @ slide)
+        size = np.linalg.norm(wished)
+        before, contact.grip = contact.grip, wished * (held(size, push, *self.twin.friction(contact)) if size > 0 else 1.0)
+        return contact.grip - before
+
+    def iterate(self, once):
+        """Sweep over the contacts until little changes; `once` gives what one contact changes, and how hard it pushes."""
         for _ in range(SWEEPS):
-            before = impulses.copy()
-            for c, contact in enumerate(self.contacts):
-                n = contact.normal
-                rise = n @ (shift + np.cross(turn, self.arm(contact)))
-                impulses[c] = max(0.0, before[c] + (wanted[c] - rise) / self.response(contact, n))
-                shift, turn = self.pushed(shift, turn, contact, (impulses[c] - before[c]) * n)
-            if settled(before, impulses):
+            changes, pushes = zip(*[once(contact) for contact in self.contacts], strict=True)
+            if max(changes) <= SETTLED * max(pushes):
                 break
-        given[:] = [impulse * self.twin.w[contact.k] for impulse, contact in zip(impulses, self.contacts, strict=True)]
-        return shift, turn
 
-    def pushed(self, shift, turn, contact, impulse):
-        return shift + impulse / self.mass, turn + self.inverse_inertia @ np.cross(self.arm(contact), impulse)
+    def separate(self, first):
+        """One pass: contacts rise as they shall, slides are taken back within the cone."""
+        if not self.contacts:
+            return
+        self.shift, self.turn = np.zeros(3), np.zeros(3)
+        wishes = {id(contact): self.aim(contact) for contact in self.contacts}
+        if first:
+            for contact in self.contacts:
+                self.strike(contact, contact.impulse * contact.normal)
 
-    def move(self, shift, turn):
-        angle = np.linalg.norm(turn)
-        rotation = turned(turn / angle, angle) if angle > 0 else np.eye(3)
+        def once(contact):
+            n, u = contact.normal, self.risen(contact)
+            push = max(0.0, contact.impulse + (wishes[id(contact)] - n @ u) / (n @ self.answer(contact) @ n))
+            impulse = (push - contact.impulse) * n + self.gripped(contact, push, contact.moved + u)
+            contact.impulse = push
+            self.strike(contact, impulse)
+            return np.abs(impulse).max(), push
+
+        self.iterate(once)
+        angle = np.linalg.norm(self.turn)
+        rotation = turned(self.turn / angle, angle) if angle > 0 else np.eye(3)
         for p in self.particles:
-            self.twin.x[p] = self.centre + shift + rotation @ (self.twin.x[p] - self.centre)
-        self.centre = self.centre + shift
+            self.twin.x[p] = self.centre + self.shift + rotation @ (self.twin.x[p] - self.centre)
+        self.centre = self.centre + self.shift
 
-    def separate(self):
-        pushes = [contact.push for contact in self.contacts]
-        twist = self.twist([-contact.height(self.twin.x) for contact in self.contacts], pushes)
-        for contact, push in zip(self.contacts, pushes, strict=True):
-            contact.push = push
-        self.move(*twist)
+    def keep(self):
+        """The impulses that the next substep begins with, of every particle the greatest."""
+        for contact in self.contacts:
+            self.kept[contact.k] = (None, 0.0)
+        for contact in self.contacts:
+            if contact.impulse > self.kept[contact.k][1]:
+                self.kept[contact.k] = contact.solid, contact.impulse
+            contact.push = contact.impulse / self.mass
 
-    def bounce(self):
-        """Contacts that rebound get the displacement that they leave with, by a twist of the previous positions."""
-        leaves = [contact.rebound > 0 and contact.push > 0 for contact in self.contacts]
-        wanted = [contact.rebound - contact.approach(self.twin.x) if leave else -np.inf
-                  for contact, leave in zip(self.contacts, leaves, strict=True)]
-        given = [0.0] * len(wanted)
-        shift, turn = self.twist(wanted, given)
-        for contact, push in zip(self.contacts, given, strict=True):
-            contact.push += push
+    def rebound(self):
+        """Velocities: an impact leaves as it should, and no faster than so what was pushed out of an overlap."""
+        if not self.contacts:
+            return
+        for contact in self.contacts:
+            contact.moved = contact.moved + self.risen(contact)
+        self.shift, self.turn = np.zeros(3), np.zeros(3)
+
+        def once(contact):
+            if contact.impulse == 0:
+                return 0.0, 0.0
+            n, u = contact.normal, self.risen(contact)
+            wanted = contact.kick + (contact.rebound - n @ (contact.moved + u)) / (n @ self.answer(contact) @ n)
+            kick = min(np.inf if contact.rebound > 0 else 0.0, max(-contact.impulse, wanted))
+            change, contact.kick = kick - contact.kick, kick
+            self.strike(contact, change * n)
+            if kick > 0:
+                self.strike(contact, self.gripped(contact, contact.impulse + kick, contact.moved + u))
+            return abs(change), contact.impulse
+
+        self.iterate(once)
         for p in self.particles:
-            self.twin.previous[p] -= shift + np.cross(turn, self.twin.x[p] - self.centre)
-
-    def rub(self):
-        """A twist that takes back the sliding at every contact, each within its cone."""
-        shift, turn = np.zeros(3), np.zeros(3)
-        impulses = [np.zeros(3) for _ in self.contacts]
-        for _ in range(SWEEPS):
-            before = impulses.copy()
-            for c, contact in enumerate(self.contacts):
-                slide = contact.slide(self.twin.x[contact.k] + shift + np.cross(turn, self.arm(contact)))
-                length = np.linalg.norm(slide)
-                if contact.push <= 0 or length == 0:
-                    continue
-                wished = impulses[c] - slide / self.response(contact, slide / length)
-                size = np.linalg.norm(wished) * self.twin.w[contact.k]
-                impulses[c] = wished * held(size, contact.push, *self.twin.friction(contact))
-                shift, turn = self.pushed(shift, turn, contact, impulses[c] - before[c])
-            if settled(before, impulses):
-                break
-        self.move(shift, turn)
+            self.twin.previous[p] -= self.shift + np.cross(self.turn, self.twin.x[p] - self.centre)

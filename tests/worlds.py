@@ -10,21 +10,21 @@ from verlet_numba.scene.build import build, frames
 from verlet_numba.scene.load import loads
 from verlet_numba.scene.place import place
 
-EVERYTHING = {
+APART = {
     "time": {"duration": 1, "frame_rate": 60},
     "solver": {"substeps": 4, "iterations": 2},
     "effects": {"gravity": [0.5, 0, -9.81], "drag": {"linear": 0.3, "quadratic": 0.2}, "damping": 0.4,
                 "wind": {"velocity": [2, 1, 0.5], "density": 1.2}, "friction": {"static": 0.5, "dynamic": 0.3},
-                "restitution": 0.1},
+                "restitution": 0.1, "self_collision": True},
     "bodies": [
         {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 3], "mass": 0.2, "thickness": 0.04,
          "position": [0, 0, 0.7], "rotation": {"axis": [1, 2, 0], "degrees": 10}, "velocity": [0.3, 0, -2]},
         {"kind": "rope", "name": "line", "start": [-0.9, -0.9, 1.2], "end": [0.3, -0.9, 1.2], "segments": 5, "mass": 0.5,
          "compliance": 1e-4, "pinned": [0], "path": [[0.02, 0, 0, 0], [0.1, 0.1, 0, 0.05], [0.5, 0.1, 0.4, 0]]},
-        {"kind": "icosahedron", "name": "dice", "radius": 0.12, "mass": 1, "count": 5, "velocity": [0, 0, -3],
+        {"kind": "icosahedron", "name": "dice", "radius": 0.12, "mass": 1, "count": 3, "velocity": [0, 0, -3],
          "angular_velocity": [1, 5, 2], "restitution": 0.5, "friction": 0.2,
-         "scatter": {"inside": [[-0.9, 0.3, 0.1], [0.9, 0.9, 0.9]], "speed": [0, 2]}},
-        {"kind": "box", "name": "crate", "size": [0.2, 0.3, 0.2], "mass": 2, "position": [0.6, -0.2, 0.102],
+         "scatter": {"inside": [[-0.9, 0.6, 0.1], [0.9, 0.9, 0.9]], "speed": [0, 2]}},
+        {"kind": "box", "name": "crate", "size": [0.2, 0.3, 0.2], "mass": 2, "position": [0.6, 0.1, 0.102],
          "rotation": {"axis": [0.1, 0, 1], "degrees": 20}, "velocity": [2, 0, 0]},
         {"kind": "particles", "name": "arm", "radius": 0.01, "velocity": [0, 1, -4], "compliance": 1e-3,
          "positions": [[0.3, -0.9, 1.2], [0.6, -0.9, 1.2], [0.6, -0.6, 1.2], [0.4, -0.5, 1.3]], "masses": [1, 2, 0.5, 1],
@@ -37,7 +37,22 @@ EVERYTHING = {
         {"kind": "box", "size": [0.4, 0.3, 0.2], "position": [-0.5, -0.6, 0.1], "friction": 0.9, "restitution": 0.4},
         {"kind": "cylinder", "radius": 0.15, "axis": [1, 1, 0.2], "length": 0.8, "position": [0.5, -0.6, 0.2]}],
     "output": {"fields": ["velocity"], "precision": "float64"}}
-"""Calls for every effect, in every kind of constraint: copies and cloth in runs, single bodies in sticks, angles."""
+"""Calls for every effect, in every kind of constraint: copies and cloth in runs, single bodies in sticks, angles.
+
+Its bodies meet colliders, rigid ones the room alone, and each other only later.
+"""
+
+EVERYTHING = APART | {"bodies": [
+    *APART["bodies"],
+    {"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 0.5, "position": [0.65, 0.1, 0.33], "velocity": [1.5, 0, -2]},
+    {"kind": "box", "name": "block", "size": [0.2, 0.2, 0.2], "mass": 1, "position": [-0.5, -0.6, 0.302], "velocity": [0, 0, -1],
+     "rotation": {"axis": [1, 0, 1], "degrees": 5}},
+    {"kind": "rope", "name": "string", "start": [0.5, 0.05, 0.48], "end": [0.8, 0.15, 0.48], "segments": 4, "mass": 0.1,
+     "thickness": 0.03, "velocity": [1, 0, -2]}]}
+"""The same, and a die falls on the crate, a block on the box, and a string on the die."""
+
+PAPER = EVERYTHING | {"solver": {"preset": "paper", "substeps": 4, "iterations": 3}}
+"""The same, answered as the paper does: features are moved apart, bodies relaxed along their constraint graph."""
 
 FREE = {
     "time": {"duration": 1, "frame_rate": 60},
@@ -50,6 +65,9 @@ FREE = {
          "velocities": [[0, 0, 1], [1, 0, 0], [0, 2, 0], [0, 0, -2]]}],
     "output": {"precision": "float64"}}
 """Gravity alone: runs, sticks and angles in free flight. Scenes made from it share one compiled frame loop."""
+
+
+CRATE = {"kind": "box", "name": "crate", "size": [0.4, 0.4, 0.4], "mass": 2, "position": [5, 0, 0.2]}
 
 
 def with_changes(scene, **changes):

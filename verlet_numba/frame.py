@@ -89,7 +89,7 @@ def advance(world, frames, budget):
             touch_hulls(mixed, points, friction, rigid, touches, MIXED)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
-            recall_colliders(contact, rigid, touches)
+            recall_colliders(contact, rigid, touches, clock[NUMBER])
             recall_hulls(meet, rigid, touches, HULLS)
             recall_hulls(mixed, rigid, touches, MIXED)
             begin_features(inverse_mass, meet, hulls, features)

@@ -10,15 +10,21 @@ import worlds
 
 from verlet_numba import buffers
 from verlet_numba.scene.build import frames
+from verlet_numba.scene.meeting import roomier
 
 SOURCE = Path(buffers.__file__).read_text()
 COMMENT = re.compile(r"#\s+(?:\((?P<shape>[^)]*)\)\s+)?(?P<kind>real|double|int|file)\s+(?P<unit>[^;]+?)(?:;\s.+)?$")
 UNIT = re.compile(r"1|SI|1?/?\(?(?:rad|kg|m|s|N)(?:\^\d)?(?:[ /]\(?(?:rad|kg|m|s|N)(?:\^\d)?\)?)*\)?")
 EVERYWHERE = ("n", "N", "K", "L")           # symbols that mean the same in every structure
+TOGETHER = {"H": ("Hulls", "Search", "Meet", "Features", "Friction", "Restitution"), "E": ("Rigid", "Touches"),
+            "M": ("Pairs", "Search"), "T": ("Meetings", "Manifold"), "P": ("Candidates", "Spheres")}
+"""Symbols that mean the same in several structures, within one of the sets that effects come in."""
+SIZE = re.compile(r"(?P<times>\d*)(?P<symbol>[A-Za-z]*)(?: \+ (?P<more>\d+))?")
 SCENES = {
     "everything": worlds.EVERYTHING,
     "single": worlds.with_changes(worlds.EVERYTHING, solver={"precision": "float32"}, output={"precision": "float32"}),
     "free": worlds.FREE,
+    "paper": worlds.PAPER,
     "empty": {"time": {"duration": 1}, "effects": {}},
     "one pass": worlds.with_changes(worlds.EVERYTHING, solver={"iterations": 1, "tolerance": 0.01, "square_root": "approximate"},
                                     effects={"friction": None, "restitution": None, "gravity": None})}
@@ -53,8 +59,9 @@ def structures(value, path="world"):
 
 def hold(path, structure, real, file, symbols):
     """Check one structure; `symbols` of its own start empty, the shared ones fill up."""
-    own = {}
-    for name, entry in DECLARED[type(structure).__name__].items():
+    own, kind_of = {}, type(structure).__name__
+    family = "soft" if "points" in path or "mixed" in path else "hard"
+    for name, entry in DECLARED[kind_of].items():
         value, where = getattr(structure, name), f"{path}.{name}"
         if entry is None or value is None:
             continue
@@ -66,16 +73,19 @@ def hold(path, structure, real, file, symbols):
         assert value.dtype == dtype, where
         assert value.flags.c_contiguous, where
         assert value.flags.owndata or value.base is not None, where
-        sizes = [size.strip() for size in shape.split(",") if size.strip()]
+        sizes = [SIZE.fullmatch(size.strip()) for size in shape.split(",") if size.strip()]
         assert value.ndim == len(sizes), where
         for size, length in zip(sizes, value.shape, strict=True):
-            symbol, _, more = size.partition("+")
-            if symbol.isdigit():
-                assert length == int(symbol), where
-            else:
-                symbol, length = symbol.strip(), length - int(more or 0)
-                known = symbols if symbol in EVERYWHERE else own
-                assert known.setdefault(symbol, length) == length, f"{where}: {symbol} is {known[symbol]} elsewhere"
+            times, symbol, more = size["times"], size["symbol"], int(size["more"] or 0)
+            if not symbol:
+                assert length == int(times), where
+                continue
+            whole, rest = divmod(length - more, int(times or 1))
+            assert rest == 0, f"{where}: {length} is not {size[0]}"
+            known, key = (symbols, symbol) if symbol in EVERYWHERE else (own, symbol)
+            if kind_of in TOGETHER.get(symbol, ()):
+                known, key = symbols, (family, symbol)
+            assert known.setdefault(key, whole) == whole, f"{where}: {symbol} is {known[key]} elsewhere"
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -102,8 +112,26 @@ def test_units_are_those_of_the_si():
 
 def test_scenes_have_every_structure():
     """Else the comments of the others are not looked at."""
-    seen = {type(structure).__name__ for _, structure in structures(worlds.built(worlds.EVERYTHING).world)} | {"Frames"}
+    seen = {type(structure).__name__ for scene in (worlds.EVERYTHING, worlds.PAPER)
+            for _, structure in structures(worlds.built(scene).world)} | {"Frames"}
     assert seen == set(DECLARED)
+
+
+def room_of(effects):
+    """How many touches there may be: contacts, and meetings of hulls and of particles with hulls."""
+    return sum(entry.size for entry in (effects.contact and effects.contact.particle, effects.meet and effects.meet.meetings.pair,
+                                        effects.mixed and effects.mixed.meetings.pair) if entry is not None)
+
+
+@pytest.mark.parametrize("times", [0, 1, 2])
+def test_there_is_room_for_as_many_touches_as_contacts_and_meetings(times):
+    """Kernels do not check bounds: one more would be written beyond the arrays."""
+    effects = worlds.built(worlds.EVERYTHING).world.effects
+    for _ in range(times):
+        effects = roomier(effects)
+    room = room_of(effects)
+    assert effects.touches.first.size >= room
+    assert effects.rigid.size.size >= effects.rigid.bodies + room + 1
 
 
 def test_gate_casts_once_and_copies_only_what_it_must():

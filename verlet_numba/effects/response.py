@@ -60,7 +60,11 @@ def still_given(overlap, met, number, standing, rate):
 
 @kernel
 def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
-    """Lines and wishes of the touches between hulls, from the corners where they are."""
+    """Lines and wishes of the touches between hulls, from the corners where they are.
+
+    Two bodies push each other midway between the points of theirs that touch: with equal and opposite impulses at one point
+    angular momentum is kept, whatever they overlap by.
+    """
     if meet is None or rigid is None:
         return
     corner, weight, normal = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal
@@ -79,6 +83,9 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         gap = nx * (px - qx) + ny * (py - qy) + nz * (pz - qz) - rounding[g] - rounding[q]
         if body[g] < 0 and particle[start[g]] < 0:      # the collider was the first hull
             px, py, pz, qx, qy, qz, nx, ny, nz, q = qx, qy, qz, px, py, pz, -nx, -ny, -nz, g
+        if b != world and reach[a] > 0.0 and reach[b] > 0.0:     # what one gains in angular momentum the other loses
+            px, py, pz = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (pz + qz)
+            qx, qy, qz = px, py, pz
         px, py, pz = px - mass[a, 1], py - mass[a, 2], pz - mass[a, 3]
         sx, sy, sz = shift_of(step, moved, a, px, py, pz)
         if b == world:
@@ -182,7 +189,7 @@ def link(rigid, touches):
 
 
 @kernel
-def recall_colliders(contact, rigid, touches):
+def recall_colliders(contact, rigid, touches, number):
     """What pushed in the last substep pushes now, to begin with: touches with colliders."""
     if rigid is None:
         return
@@ -191,9 +198,10 @@ def recall_colliders(contact, rigid, touches):
         return
     particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
                                                     touches.source)
+    met = contact.met
     for t in range(touches.until[COLLIDERS]):
         k = particle[source[t]]
-        if keeper[k] == solid[source[t]]:
+        if keeper[k] == solid[source[t]] and met[k] >= number - 1:
             given[t, 0] = kept[k]
 
 

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from verlet_numba.physics.rigid import cross, inverse_symmetric, lever, times_symmetric
+from verlet_numba.physics.rigid import about_axis, across, cross, inverse_symmetric, response, times_symmetric
 
 
 def entries(matrix):
     """xx, yy, zz, xy, xz, yz."""
     return matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
 
 
 def inertias(count=30):
@@ -31,17 +35,42 @@ def test_particles_on_a_line_or_in_a_point_answer_as_if_they_could_not_turn():
     assert inverse_symmetric(*[0.0] * 6) == (0,) * 6
 
 
-def test_lever_is_the_answer_to_a_unit_impulse():
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_inverse_knows_no_scale(size):
+    """Inertias go with the square of the size; that of a disc 1:1000 is no line's."""
+    for _, inertia, _ in inertias(5):
+        found = inverse_symmetric(*entries(inertia * size**2))
+        np.testing.assert_allclose(found, entries(np.linalg.inv(inertia)) / size**2, rtol=1e-9)
+    disc = np.diag([1.0 + 1e-6, 1.0 + 1e-6, 2.0]) * size**2
+    np.testing.assert_allclose(inverse_symmetric(*entries(disc)), entries(np.linalg.inv(disc)), rtol=1e-12)
+
+
+def test_response_is_the_displacement_along_one_direction_of_a_unit_impulse_along_another():
     for mass, inertia, rng in inertias():
-        r, n = rng.normal(size=(2, 3))
-        n /= np.linalg.norm(n)
-        inverse = np.linalg.inv(inertia)
-        arm = np.cross(r, n)
-        found = lever(*r, *n, 1 / mass, tuple(entries(inverse)))
-        np.testing.assert_allclose(found[:3], arm, rtol=1e-12)
-        np.testing.assert_allclose(found[3:6], inverse @ arm, rtol=1e-9)
-        moved = n / mass + np.cross(inverse @ arm, r)
-        assert found[6] == pytest.approx(moved @ n)
+        r, u, v = rng.normal(size=(3, 3))
+        u, v, inverse = unit(u), unit(v), np.linalg.inv(inertia)
+        answers = (1 / mass, *entries(inverse))
+        moved = v / mass + np.cross(inverse @ np.cross(r, v), r)
+        assert response(tuple(r), tuple(u), tuple(v), answers) == pytest.approx(moved @ u, rel=1e-9, abs=1e-12)
+        assert response(tuple(r), tuple(v), tuple(u), answers) == pytest.approx(moved @ u, rel=1e-9, abs=1e-12)    # reciprocity
+        assert response(tuple(r), tuple(u), tuple(u), answers) >= 1 / mass
+
+
+def test_a_body_on_an_axis_turns_about_it_alone():
+    for _, inertia, rng in inertias():
+        a, torque = unit(rng.normal(size=3)), rng.normal(size=3)
+        found = times_symmetric(*about_axis(*entries(inertia), *a), *torque)
+        np.testing.assert_allclose(found, a * (a @ torque) / (a @ inertia @ a), rtol=1e-10)
+        assert about_axis(*entries(inertia), 0.0, 0.0, 0.0) == (0,) * 6
+
+
+def test_directions_across_are_an_upright_frame():
+    rng = np.random.default_rng(2)
+    directions = [*rng.normal(size=(200, 3)), *np.eye(3), *-np.eye(3), [1e-9, -1e-9, -1.0]]
+    for n in map(unit, directions):
+        u, v = across(*n)
+        np.testing.assert_allclose(np.array([u, v, n]) @ np.array([u, v, n]).T, np.eye(3), atol=1e-15 * 4)
+        np.testing.assert_allclose(np.cross(u, v), n, atol=1e-15 * 4)
 
 
 def test_cross():
