@@ -13,6 +13,7 @@ from verlet_numba.effects.drag import resist
 from verlet_numba.effects.features import begin_features, part_features, rub_features
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
+from verlet_numba.effects.impact import strike_bodies, strike_spheres
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
 from verlet_numba.effects.most_moved import choose_lists, remember
 from verlet_numba.effects.motion import carry, move
@@ -85,16 +86,19 @@ def advance(world, frames, budget):
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
-            touch_hulls(meet, hulls, friction, rigid, touches, HULLS)
-            touch_hulls(mixed, points, friction, rigid, touches, MIXED)
+            touch_hulls(meet, hulls, friction, restitution, rigid, touches, HULLS)
+            touch_hulls(mixed, points, friction, restitution, rigid, touches, MIXED)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
             recall_colliders(contact, rigid, touches, clock[NUMBER])
             recall_hulls(meet, rigid, touches, HULLS)
             recall_hulls(mixed, rigid, touches, MIXED)
+            strike_bodies(position, inverse_mass, acceleration, contact, meet, hulls, mixed, points, friction, restitution, rigid,
+                          touches, clock[NUMBER], h)
             begin_features(inverse_mass, meet, hulls, features)
             begin_features(inverse_mass, mixed, points, features)
             begin_spheres(previous, spheres)
+            strike_spheres(position, previous, inverse_mass, acceleration, spheres, restitution, h)
             forget(runs_softness)
             forget(sticks_softness)
             remember(position, collided)

@@ -13,7 +13,7 @@ from verlet_numba.physics.friction import held
 @kernel
 def rub(position, contact, friction):
     """Take back sliding relative to the collider's surface, contact by contact, of particles that answer alone."""
-    if friction is None:
+    if friction is None or contact is None:
         return
     particle, solid, body, push = contact.particle, contact.solid, contact.body, contact.push
     normal, anchor, own, other = contact.normal, contact.anchor, friction.particle, friction.solid

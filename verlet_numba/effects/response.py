@@ -32,14 +32,17 @@ def aim_colliders(position, contact, rigid, touches, number, h):
     x, y, z = position[0], position[1], position[2]
     particle, normal, bound, anchor = contact.particle, contact.normal, contact.bound, contact.anchor
     first, source, mass, reach, line, answer = touches.first, touches.source, rigid.mass, rigid.reach, touches.line, touches.answer
-    overlap, met = contact.overlap, contact.met
+    overlap, met, kick = contact.overlap, contact.met, rigid.kick
     for t in range(touches.until[COLLIDERS]):
         c, e = source[t], first[t]
         k = particle[c]
         nx, ny, nz = normal[0, c], normal[1, c], normal[2, c]
-        sx, sy, sz = x[k] - anchor[0, c], y[k] - anchor[1, c], z[k] - anchor[2, c]
+        rx, ry, rz = x[k] - mass[e, 1], y[k] - mass[e, 2], z[k] - mass[e, 3]
+        sx = x[k] - anchor[0, c] + (kick[e, 0] + kick[e, 4] * rz - kick[e, 5] * ry)
+        sy = y[k] - anchor[1, c] + (kick[e, 1] + kick[e, 5] * rx - kick[e, 3] * rz)
+        sz = z[k] - anchor[2, c] + (kick[e, 2] + kick[e, 3] * ry - kick[e, 4] * rx)
         line[t, 0], line[t, 1], line[t, 2] = nx, ny, nz
-        line[t, 3], line[t, 4], line[t, 5] = x[k] - mass[e, 1], y[k] - mass[e, 2], z[k] - mass[e, 3]
+        line[t, 3], line[t, 4], line[t, 5] = rx, ry, rz
         line[t, 6] = line[t, 7] = line[t, 8] = 0.0
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
@@ -72,7 +75,8 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     other, body, particle, start = meet.pairs.second, hulls.body, hulls.particle, hulls.start
     x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]
     first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
-    mass, step, moved, reach, overlap, met = rigid.mass, rigid.step, rigid.moved, rigid.reach, meet.pairs.overlap, meet.pairs.met
+    mass, step, moved, kick, reach = rigid.mass, rigid.step, rigid.moved, rigid.kick, rigid.reach
+    overlap, met = meet.pairs.overlap, meet.pairs.met
     world = reach.size - 1
     for t in range(touches.until[which - 1], touches.until[which]):
         m, a, b = source[t], first[t], second[t]
@@ -87,14 +91,14 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
             px, py, pz = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (pz + qz)
             qx, qy, qz = px, py, pz
         px, py, pz = px - mass[a, 1], py - mass[a, 2], pz - mass[a, 3]
-        sx, sy, sz = shift_of(step, moved, a, px, py, pz)
+        sx, sy, sz = shift_of(step, moved, kick, a, px, py, pz)
         if b == world:
             tx, ty, tz = carried_by(contact, hulls.solid[q], qx, qy, qz)
             size = reach[a]
             qx = qy = qz = 0.0
         else:
             qx, qy, qz = qx - mass[b, 1], qy - mass[b, 2], qz - mass[b, 3]
-            tx, ty, tz = shift_of(step, moved, b, qx, qy, qz)
+            tx, ty, tz = shift_of(step, moved, kick, b, qx, qy, qz)
             size = min(reach[a], reach[b]) if min(reach[a], reach[b]) > 0.0 else max(reach[a], reach[b])
         sx, sy, sz = sx - tx, sy - ty, sz - tz
         line[t, 0], line[t, 1], line[t, 2] = nx, ny, nz
@@ -102,7 +106,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         p = pair[m]
-        standing = max(0.0, nx * sx + ny * sy + nz * sz - gap)
+        standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
         overlap[p] = still_given(overlap[p], met[p], number, standing, RECOVERY * size * h)
         met[p] = number
         answer[t, 0] = -gap - overlap[p]
@@ -117,11 +121,11 @@ def point_of(x, y, z, corner, weight, m, side):
 
 
 @inlined
-def shift_of(step, moved, e, rx, ry, rz):
-    """Displacement of entity e at the arm r since the start of the substep."""
-    ox, oy, oz = step[e, 3] + moved[e, 3], step[e, 4] + moved[e, 4], step[e, 5] + moved[e, 5]
-    return (step[e, 0] + moved[e, 0] + (oy * rz - oz * ry), step[e, 1] + moved[e, 1] + (oz * rx - ox * rz),
-            step[e, 2] + moved[e, 2] + (ox * ry - oy * rx))
+def shift_of(step, moved, kick, e, rx, ry, rz):
+    """Displacement of entity e at the arm r since the start of the substep, what its velocity was given included."""
+    ox, oy, oz = step[e, 3] + moved[e, 3] + kick[e, 3], step[e, 4] + moved[e, 4] + kick[e, 4], step[e, 5] + moved[e, 5] + kick[e, 5]
+    return (step[e, 0] + moved[e, 0] + kick[e, 0] + (oy * rz - oz * ry), step[e, 1] + moved[e, 1] + kick[e, 1] + (oz * rx - ox * rz),
+            step[e, 2] + moved[e, 2] + kick[e, 2] + (ox * ry - oy * rx))
 
 
 @kernel
@@ -372,9 +376,10 @@ def rebound(friction, rigid, touches):
         return
     first, second, order, island = touches.first, touches.second, touches.order, touches.island
     line, answer, given, kick, mass = touches.line, touches.answer, touches.given, rigid.kick, rigid.mass
-    for t in range(touches.until[-1]):                  # the last pass has moved them since they were aimed
+    for t in range(touches.until[-1]):                  # the last pass has moved them since; what was kicked before stands in both
         ux, uy, uz = relative(rigid.twist, first[t], second[t], line, t)
-        line[t, 9], line[t, 10], line[t, 11] = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
+        vx, vy, vz = relative(kick, first[t], second[t], line, t)
+        line[t, 9], line[t, 10], line[t, 11] = line[t, 9] + ux - vx, line[t, 10] + uy - vy, line[t, 11] + uz - vz
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
         for _ in range(SWEEPS if end - begin <= FEW_TOUCHES else 1):

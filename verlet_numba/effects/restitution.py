@@ -12,7 +12,7 @@ from verlet_numba.physics.restitution import impact
 @kernel
 def foresee(position, acceleration, contact, restitution, h):
     """Find the contacts that hit in this substep and raise their bound to the rebound's end."""
-    if restitution is None:
+    if restitution is None or contact is None:
         return
     particle, solid, normal, bound, anchor = contact.particle, contact.solid, contact.normal, contact.bound, contact.anchor
     own, other, rebound = restitution.particle, restitution.solid, restitution.rebound
@@ -45,7 +45,7 @@ def pull_along(acceleration, normal, c, k):
 @kernel
 def bounce(position, previous, contact, restitution):
     """Give what hit, and answers alone, the displacement that it leaves with, by moving its previous position."""
-    if restitution is None:
+    if restitution is None or contact is None:
         return
     particle, body, push, normal, anchor = contact.particle, contact.body, contact.push, contact.normal, contact.anchor
     rebound = restitution.rebound

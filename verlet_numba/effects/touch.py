@@ -87,7 +87,7 @@ def leave_of(restitution, c):
 
 
 @kernel
-def touch_hulls(meet, hulls, friction, rigid, touches, which):
+def touch_hulls(meet, hulls, friction, restitution, rigid, touches, which):
     """Meetings become touches; where one hull is a collider's the second entity is the world, whichever hull it was."""
     if meet is None or rigid is None:
         return
@@ -107,7 +107,7 @@ def touch_hulls(meet, hulls, friction, rigid, touches, which):
             enter(parent, order, touched, b)
         first[t], second[t], source[t] = (b, a, m) if a == world else (a, b, m)
         answer[t, 2], answer[t, 3] = grip_between(friction, which, g, h)
-        answer[t, 4] = 0.0
+        answer[t, 4], answer[t, 8] = 0.0, bounce_between(restitution, which, g, h)
         t += 1
     touches.until[which:] = t
 
@@ -133,6 +133,15 @@ def grip_between(friction, which, g, h):
         return 0.0, 0.0
     own = friction.hull if which == HULLS else friction.point
     return math.sqrt(own[0, g] * own[0, h]), math.sqrt(own[1, g] * own[1, h])
+
+
+@kernel
+def bounce_between(restitution, which, g, h):
+    """Restitution of hull g on hull h of the HULLS or the MIXED: the larger of the two."""
+    if restitution is None:
+        return 0.0
+    own = restitution.hull if which == HULLS else restitution.point
+    return max(own[g], own[h])
 
 
 @kernel

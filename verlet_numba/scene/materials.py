@@ -28,7 +28,7 @@ def friction_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering:
 
 
 def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numbering: Numbering, size: int, hulls: Hulls | None,
-                   room: int, real: Any) -> Restitution | None:
+                   points: Hulls | None, room: int, real: Any) -> Restitution | None:
     """Coefficients of particles, colliders and hulls; None if all are 0: two that meet take the larger."""
     default = scene.effects.restitution or 0.0
     given = [solid.collider.restitution for solid in found]
@@ -36,8 +36,8 @@ def restitution_of(scene: Scene, found: list[Solid], bodies: list[Body], numberi
     particle = spread(numbering, [body.restitution for body in bodies], size)
     if not particle.any() and not solid.any():
         return None
-    hull = gate(of_hulls(hulls, particle, solid), np.float64)
-    return Restitution(gate(particle, real), gate(solid, np.float64), hull, gate(np.zeros(room), np.float64))
+    hull, point = (gate(of_hulls(each, particle, solid), np.float64) for each in (hulls, points))
+    return Restitution(gate(particle, real), gate(solid, np.float64), hull, point, gate(np.zeros(room), np.float64))
 
 
 def of_hulls(hulls: Hulls | None, particle: Floats, solid: Floats) -> Floats:

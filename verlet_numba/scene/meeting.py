@@ -91,7 +91,7 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     return Contact(moving(found) if contact is not None else None, contact, hulls, meet, trees, spheres, points, mixed,
                    rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
-                   restitution_of(scene, found, bodies, numbering, size, hulls, FIRST_ROOM, real))
+                   restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real))
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,
@@ -199,8 +199,8 @@ def meetings_of(room: int) -> Meetings:
 
 def search_of(hulls: int, room: int) -> Search:
     """The search for pairs among so many hulls, with room for so many pairs; no list has been made."""
-    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls), real_(GRIDS),
-                  whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4), whole(2 * hulls), whole(room))
+    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls),
+                  real_(GRIDS), whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4), whole(2 * hulls), whole(room))
 
 
 def narrow_of(hulls: Hulls) -> Narrow:
