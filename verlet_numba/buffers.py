@@ -236,9 +236,10 @@ class Hulls(NamedTuple):
     corner: Array               # (3, Q) double m; where the corners are
     centre: Array               # (3, H) double m; mean of the corners
     solid: Array                # (H,) int 1; collider whose hull it is, -1: none
-    local: Array                # (3, Q) double m; corners of colliders in their own frame
+    local: Array                # (3, Q) double m; corners in the frame of their body or collider
     reach: Array                # (H,) double m; radius of the sphere about the centre that holds the hull, rounding included
     rounding: Array             # (H,) double m
+    flat: Array                 # (H,) int 1; 1: it has a face to rest on, and meets another such hull in several contacts
     graph: Array                # (H,) int 1; first row of the hull's corners in `neighbours`, -1: corners are scanned
     neighbours: Array           # (E + 1,) int 1; neighbours of the corner of row e: neighbour[neighbours[e]:neighbours[e + 1]]
     neighbour: Array            # (U,) int 1; corner number within the hull

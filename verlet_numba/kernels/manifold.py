@@ -90,16 +90,20 @@ def widen(hulls, pairs, meetings, scratch):
 def mark(hulls, pairs, meetings, points):
     """Set points[t] to 1 where both hulls have several corners near their support planes, else to 0. Whether any have.
 
-    The contact's own points lie on the support planes: one scan of either hull tells.
+    Hulls without a face to rest on keep their single contact unseen. The contact's own points lie on the support planes: one
+    scan of either hull tells.
     """
     x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]
-    start, size, reach = hulls.start, hulls.size, hulls.reach
+    start, size, reach, flat = hulls.start, hulls.size, hulls.reach, hulls.flat
     pair, first, second = meetings.pair, pairs.first, pairs.second
     nx, ny, nz = meetings.normal[0], meetings.normal[1], meetings.normal[2]
     corner, weight = meetings.corner, meetings.weight
     some = False
     for t in range(meetings.listed[0]):
+        points[t] = 0
         a, b = first[pair[t]], second[pair[t]]
+        if flat[a] == 0 or flat[b] == 0:
+            continue
         px, py, pz = weighted(x, y, z, corner, weight, 0, t)
         level = nx[t] * px + ny[t] * py + nz[t] * pz + NEAR * reach[a]
         wide = below(x, y, z, start[a], size[a], nx[t], ny[t], nz[t], level) > 1

@@ -4,11 +4,13 @@ A convex body is one part, the convex hull of its particles. Another one is spli
 into parts whose corners become particles of it, see `split`: it is never taken for its own hull.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from verlet_numba.scene.body import Floats, Integers, Shape
+from verlet_numba.scene.body import Body, Floats, Integers, Shape
+from verlet_numba.scene.clearance import Surface
 from verlet_numba.scene.half_edge import adjacency
 from verlet_numba.scene.shapes import ShapeError, edges
 
@@ -16,6 +18,7 @@ CONVEX = 1e-5           # how far, in parts of the size, a vertex may lie outsid
 CLIMB = 32              # corners above which the support point is found by climbing from neighbour to neighbour
 CONCAVITY = 0.05        # how far a part may be from convex, about in parts of half the size
 SNAP = 1e-3             # corners of parts closer than this part of the size are one
+SHAPES = 256            # whose hulls are remembered
 
 
 class Part(NamedTuple):
@@ -27,11 +30,30 @@ class Part(NamedTuple):
     neighbour: Integers             # (U,) numbers within `corners`; none up to CLIMB corners, which are scanned
 
 
+@lru_cache(SHAPES)
 def hulls_of(shape: Shape) -> tuple[Part, ...]:
-    """The convex parts of a rigid body; none of another."""
+    """The convex parts of a rigid body; none of another. The same shape is looked at once."""
     if not shape.rigid:
         return ()
-    return tuple(part(shape.positions, numbers) for numbers in shape.parts or (np.arange(len(shape.positions)),))
+    particles = len(shape.positions)
+    if particles <= CLIMB and not shape.parts:
+        return (all_of(particles, shape.triangles),)
+    return tuple(part(shape.positions, numbers) for numbers in shape.parts or (np.arange(particles),))
+
+
+def hulls_in_place(body: Body) -> list[Surface]:
+    """The convex parts of a body's first copy where it starts."""
+    return [surface_of(body.positions[0], hull) for hull in hulls_of(body.shape)]
+
+
+def surface_of(positions: Floats, hull: Part) -> Surface:
+    """Corners (C, 3) of a hull, and its triangles (F, 3) in numbers of corners."""
+    return positions[hull.corners], np.searchsorted(hull.corners, hull.triangles)
+
+
+def all_of(particles: int, triangles: Integers) -> Part:
+    """A convex surface of few particles: its own hull, all of whose corners are scanned."""
+    return Part(np.arange(particles), triangles, *adjacency(np.zeros((0, 2), np.int64), particles))
 
 
 def part(positions: Floats, numbers: Integers) -> Part:
@@ -93,23 +115,30 @@ def decompose(positions: Floats, triangles: Integers) -> list[Floats]:
     The parts' corners are those of the surface to about 1e-4 of its size, and new ones where the surface is cut.
     Raises ShapeError without the package `coacd`, and for a surface it cannot cut.
     """
+    size, centre = np.ptp(positions, axis=0).max(), positions.mean(axis=0)
+    return [corners * size + centre for corners in _cut(((positions - centre) / size).tobytes(), triangles.tobytes())]
+
+
+@lru_cache(SHAPES)
+def _cut(vertices: bytes, triangles: bytes) -> tuple[Floats, ...]:
+    """Corners of the convex parts of a surface of size 1, cut once for all bodies that have it: it takes seconds."""
     try:
         import coacd
     except ImportError as error:
         raise ShapeError('is not convex, and to split it into convex parts takes a package that is not installed: '
                          'pip install "verlet-numba[mesh]"', "file") from error
     coacd.set_log_level("off")
-    size, centre = np.ptp(positions, axis=0).max(), positions.mean(axis=0)
+    surface = coacd.Mesh(np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(triangles, np.int64).reshape(-1, 3))
     # A closed surface needs no mending (`preprocess_mode`). The search is a tenth of CoACD's usual one: on tori and
     # dented spheres it finds parts of the same number and volume, six times as fast.
     try:
-        parts = coacd.run_coacd(coacd.Mesh((positions - centre) / size, triangles), threshold=CONCAVITY, seed=0,
-                                preprocess_mode="off", resolution=500, mcts_iterations=20, mcts_nodes=10, mcts_max_depth=2)
+        parts = coacd.run_coacd(surface, threshold=CONCAVITY, seed=0, preprocess_mode="off", resolution=500,
+                                mcts_iterations=20, mcts_nodes=10, mcts_max_depth=2)
     except RuntimeError as error:
         raise ShapeError(f"cannot be split into convex parts ({error})", "file") from error
     if not parts:
         raise ShapeError("cannot be split into convex parts", "file")
-    return [np.asarray(corners, np.float64) * size + centre for corners, _ in parts]
+    return tuple(np.asarray(corners, np.float64) for corners, _ in parts)
 
 
 def split(positions: Floats, triangles: Integers) -> tuple[Floats, tuple[Integers, ...]]:

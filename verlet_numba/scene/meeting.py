@@ -32,7 +32,7 @@ from verlet_numba.buffers import (
 )
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, room, solids_of
-from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene
+from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests_on_faces
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.numbering import Numbering
@@ -173,7 +173,7 @@ def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
     reach = hulls.reach[hulls.body >= 0]
     several = scene.solver.response == "body"
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
-                narrow_of(hulls), manifold_of(int(hulls.size.max()), FIRST_ROOM) if several else None, meetings_of(FIRST_ROOM),
+                narrow_of(hulls), manifold_of(int(hulls.size.max()), FIRST_ROOM) if several and rests_on_faces(hulls) else None, meetings_of(FIRST_ROOM),
                 MEETING_MARGIN * float(reach.min()) if several else 0.0, scene.solver.substeps, 1,
                 1 if scene.solver.broad_phase == "all_pairs" else None)
 

@@ -26,8 +26,7 @@ def mesh(file: Path, *, scale: float = 1.0, mass: float | None = None, density: 
     tetrahedralisation (P3 of the paper), and where those leave the body floppy, braces.
     Raises ShapeError, naming the triangle, for a surface that is not closed, consistently wound and free of crossings.
     """
-    positions, listed = load(file)
-    positions = positions * scale
+    positions, listed = load(file)                  # in the file's unit, in which all that follows is found
     notes = []
     kept = check_closed(positions, listed)
     triangles = outwards(positions, listed[kept])
@@ -48,7 +47,8 @@ def mesh(file: Path, *, scale: float = 1.0, mass: float | None = None, density: 
                      f"{len(sticks) - len(tetrahedra)} sticks through its inside")
     if len(positions) <= rigidity.DENSE_LIMIT and not rigidity.is_rigid(positions, sticks):
         raise ShapeError("cannot be held rigid by sticks: it is too flat", "file")
-    return Shape("mesh", ("points",), positions, share_mass(len(positions), mass, density, enclosed),
+    positions = positions * scale
+    return Shape("mesh", ("points",), positions, share_mass(len(positions), mass, density, enclosed * scale**3),
                  sticks, stick_lengths(positions, sticks), rigid=True, triangles=triangles, parts=parts,
                  notes=tuple(notes))
 

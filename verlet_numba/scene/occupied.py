@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from verlet_numba.scene import shapes
 from verlet_numba.scene.body import Body, Floats, Shape
 from verlet_numba.scene.clearance import Surface, clear_of_spheres, clearance, hull_clearance
+from verlet_numba.scene.hulls import hulls_in_place
 from verlet_numba.scene.problems import Problem
 from verlet_numba.scene.scatter import Free
 from verlet_numba.scene.schema import Scene
@@ -57,14 +58,14 @@ def load_surfaces(scene: Scene, folder: Path, source: Source) -> tuple[dict[int,
 class Occupied:
     """What scattered copies must keep clear of: colliders and the bodies placed so far.
 
-    A rigid body at a given place is its convex hull, a scattered one its bounding sphere. Everything else is spheres
+    A rigid body at a given place is its convex parts, a scattered one its bounding sphere. Everything else is spheres
     about its particles that together cover its sticks and triangles: a point of a triangle is at most
     side / sqrt(3) away from the nearest corner, side its longest one.
     """
 
     def __init__(self, scene: Scene, surfaces: dict[int, Surface], placed: dict[int, Body]) -> None:
         self.scene, self.surfaces = scene, surfaces
-        self.hulls = [body for body in placed.values() if body.shape.rigid]
+        self.hulls = [hull for body in placed.values() for hull in hulls_in_place(body)]
         self.centres, self.radii = np.zeros((0, 3)), np.zeros(0)
         for index, body in placed.items():
             if not body.shape.rigid:
@@ -89,8 +90,8 @@ class Occupied:
             clear = np.ones(len(points), np.bool_)
             for index, collider in enumerate(self.scene.colliders):
                 clear[clear] = clearance(collider, points[clear], self.surfaces.get(index)) >= radius
-            for body in self.hulls:
-                clear[clear] = hull_clearance(body.positions[0], body.shape.triangles, points[clear]) >= radius
+            for corners, triangles in self.hulls:
+                clear[clear] = hull_clearance(corners, triangles, points[clear]) >= radius
             clear[clear] = clear_of_spheres(points[clear], radius, self.centres, self.radii)
             return clear
         return test

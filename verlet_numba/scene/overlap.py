@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from verlet_numba.scene.body import Body, Floats
-from verlet_numba.scene.clearance import hull_clearance, planes
+from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.clearance import Surface, hull_clearance, planes
+from verlet_numba.scene.hulls import hulls_in_place
 from verlet_numba.scene.problems import Path as Key
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.shapes import edges
@@ -40,16 +41,17 @@ def overlaps(scene: Scene, bodies: list[Body]) -> Iterator[tuple[Key, str]]:
 def overlap_depth(a: Body, b: Body) -> float:
     """How deeply the first copies of two bodies overlap, m; 0 if they do not, as far as it can be told cheaply.
 
-    Rigid bodies are compared as convex hulls, a rigid and another one by the other's particles, and the rest by their
+    Rigid bodies are compared as convex parts, a rigid and another one by the other's particles, and the rest by their
     particles alone.
     """
     radius = a.shape.radius + b.shape.radius
     if a.shape.rigid and b.shape.rigid:
-        return hull_overlap(a, b)
+        parts = hulls_in_place(b)
+        return max(hull_overlap(p, q) for p in hulls_in_place(a) for q in parts)
     if a.shape.rigid or b.shape.rigid:
         solid, soft = (a, b) if a.shape.rigid else (b, a)
-        apart = hull_clearance(solid.positions[0], solid.shape.triangles, soft.positions[0])
-        return max(0.0, radius - float(apart.min()))
+        apart = min(float(hull_clearance(*hull, soft.positions[0]).min()) for hull in hulls_in_place(solid))
+        return max(0.0, radius - apart)
     return max(0.0, radius - _distance(a.positions[0], b.positions[0], radius)) if radius > 0 else 0.0
 
 
@@ -65,27 +67,34 @@ def _distance(a: Floats, b: Floats, limit: float) -> float:
     return nearest
 
 
-def hull_overlap(a: Body, b: Body) -> float:
+def hull_overlap(a: Surface, b: Surface) -> float:
     """Depth by which two convex polyhedra overlap: the least overlap of their shadows on the axes that can part them.
 
     Those are the normals of the faces of both, and the cross products of an edge of one and an edge of the other.
     """
-    p, q = a.positions[0], b.positions[0]
-    u, v = _directions(a), _directions(b)
+    p, q = a[0], b[0]
+    depth = _shared(p, q, np.concatenate([planes(*a)[0], planes(*b)[0]]))
+    if depth == 0:
+        return 0.0
+    u, v = _directions(*a), _directions(*b)
     if len(u) * len(v) > MOST_AXES:
         return 0.0
-    axes = np.concatenate([planes(p, a.shape.triangles)[0], planes(q, b.shape.triangles)[0],
-                           np.cross(u[:, None], v).reshape(-1, 3)])
+    axes = np.cross(u[:, None], v).reshape(-1, 3)
     length = np.linalg.norm(axes, axis=1)
-    axes = axes[length > 1e-9] / length[length > 1e-9, None]
-    on_a, on_b = p @ axes.T, q @ axes.T
-    shared = np.minimum(on_a.max(axis=0) - on_b.min(axis=0), on_b.max(axis=0) - on_a.min(axis=0))
-    return max(0.0, float(shared.min()))
+    parting = length > 1e-9
+    return min(depth, _shared(p, q, axes[parting] / length[parting, None]))
 
 
-def _directions(body: Body) -> Floats:
-    """Unit directions (E, 3) of a body's edges, parallel ones once."""
-    ends = body.positions[0][edges(body.shape.triangles)]
+def _shared(p: Floats, q: Floats, axes: Floats) -> float:
+    """The least overlap of the shadows of two sets of points on unit vectors (A, 3), 0 if some do not overlap."""
+    on_p, on_q = p @ axes.T, q @ axes.T
+    shared = np.minimum(on_p.max(axis=0) - on_q.min(axis=0), on_q.max(axis=0) - on_p.min(axis=0))
+    return max(0.0, float(shared.min(initial=np.inf)))
+
+
+def _directions(positions: Floats, triangles: Integers) -> Floats:
+    """Unit directions (E, 3) of a hull's edges, parallel ones once."""
+    ends = positions[edges(triangles)]
     direction = ends[:, 1] - ends[:, 0]
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     dominant = np.argmax(np.abs(direction), axis=1)

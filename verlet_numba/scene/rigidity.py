@@ -40,7 +40,7 @@ def full_rank(positions: Floats) -> int:
 
 def is_rigid(positions: Floats, sticks: Integers) -> bool:
     """True if the sticks hold the particles as sticks between all pairs would."""
-    return rank(positions, sticks) == full_rank(positions)
+    return holds_together(positions, sticks) or rank(positions, sticks) == full_rank(positions)
 
 
 def brace(positions: Floats, sticks: Integers) -> Integers:
@@ -49,7 +49,14 @@ def brace(positions: Floats, sticks: Integers) -> Integers:
     Up to DENSE_LIMIT particles these are the fewest possible. Larger bodies are braced by `grow`, which costs little
     but may add more.
     """
-    return _brace_exactly(positions, sticks) if len(positions) <= DENSE_LIMIT else grow(positions, sticks)
+    if len(positions) > DENSE_LIMIT:
+        return grow(positions, sticks)
+    return sticks if holds_together(positions, sticks) else _brace_exactly(positions, sticks)
+
+
+def holds_together(positions: Floats, sticks: Integers) -> bool:
+    """True if one cluster grows over the whole body without another stick, which proves it rigid and costs little."""
+    return bool(_braced_tetrahedron(positions, _neighbours(positions, sticks))) and len(grow(positions, sticks)) == len(sticks)
 
 
 def _brace_exactly(positions: Floats, sticks: Integers) -> Integers:
@@ -93,10 +100,7 @@ def grow(positions: Floats, sticks: Integers) -> Integers:
     connected through faces need no further stick. Time is linear in the number of sticks for bodies of that kind.
     """
     count = len(positions)
-    neighbours: list[set[int]] = [set() for _ in range(count)]
-    for i, j in sticks.tolist():
-        neighbours[i].add(j)
-        neighbours[j].add(i)
+    neighbours = _neighbours(positions, sticks)
     added: list[tuple[int, int]] = []
 
     def join(i: int, j: int) -> None:
@@ -126,6 +130,15 @@ def grow(positions: Floats, sticks: Integers) -> Integers:
         inside.add(held)
         waiting.extend(sorted(neighbours[held] - inside))
     return np.concatenate([sticks, np.array(sorted(added), np.int64).reshape(-1, 2)])
+
+
+def _neighbours(positions: Floats, sticks: Integers) -> list[set[int]]:
+    """The particles that sticks join to each particle."""
+    neighbours: list[set[int]] = [set() for _ in positions]
+    for i, j in sticks.tolist():
+        neighbours[i].add(j)
+        neighbours[j].add(i)
+    return neighbours
 
 
 def _held(positions: Floats, particle: int, anchors: set[int]) -> bool:

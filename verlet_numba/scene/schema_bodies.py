@@ -221,7 +221,8 @@ class Mesh(MassOrDensity):
 
     kind: Literal["mesh"]
     file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
-        description="file of triangles (OBJ, STL, PLY, OFF ...), relative to the scene file")
+        description="closed surface of triangles (OBJ, OFF, PLY, STL), relative to the scene file; one that is not convex "
+                    "is split into convex parts by the extra `mesh`")
     scale: Length = Field(default=1.0, description="factor from the file's unit to m")
     pinned: Numbers = Field(default=(), description="numbers of particles that stay in place")
 

@@ -77,11 +77,13 @@ def scene(pairs, capacity=100):
     rounding = np.array([r for pair in pairs for r in (pair[4] if len(pair) > 4 else (0.0, 0.0))])
     centre = np.array([hull.mean(0) for hull in bodies])
     reach = np.array([np.linalg.norm(hull - c, axis=1).max() for hull, c in zip(bodies, centre, strict=True)]) + rounding
-    none = np.zeros(0, int)
-    hulls = Hulls(none, start, size, none, np.ascontiguousarray(np.concatenate(padded).T), np.ascontiguousarray(centre.T), reach,
-                  rounding, none, none, none)
+    fields = dict.fromkeys(Hulls._fields, np.zeros(0, int))
+    hulls = Hulls(**fields | {"start": start, "size": size, "corner": np.ascontiguousarray(np.concatenate(padded).T),
+                              "centre": np.ascontiguousarray(centre.T), "reach": reach, "rounding": rounding,
+                              "local": np.zeros((3, 0)), "flat": np.ones(len(bodies), int)})
     m = len(pairs)
-    listed = Pairs(np.array([m]), 2 * np.arange(m), 2 * np.arange(m) + 1, np.zeros((3, m)), np.full((6, m), -1))
+    listed = Pairs(np.array([m]), 2 * np.arange(m), 2 * np.arange(m) + 1, np.zeros((3, m)), np.full((6, m), -1), np.zeros(m),
+                   np.zeros(m), np.zeros(m, int))
     meetings = Meetings(np.array([m]), np.full(capacity, -1), np.full((6, capacity), -1), np.full((6, capacity), np.nan),
                         np.full((3, capacity), np.nan), np.full(capacity, np.nan))
     for t, (a, _, contact, n, *_) in enumerate(pairs):
@@ -389,6 +391,31 @@ def test_full_meetings_are_left_as_they_were(capacity):
     for array, before in zip(case.meetings, same.meetings, strict=True):
         np.testing.assert_array_equal(array, before)
     contacts(case)
+
+
+@pytest.mark.parametrize("round_ones", [[0], [1], [0, 1], [0, 4, 9]])
+def test_hulls_without_a_face_to_rest_on_keep_their_contact(round_ones):
+    case, whole = many(16), many(16)
+    case.hulls.flat[round_ones] = 0
+    assert widen(*case)
+    assert widen(*whole)
+    single = {h // 2 for h in round_ones}
+    expected = [1 if pair in single else number for pair, number in enumerate([8, 1, 2, 1, 4])]
+    found = contacts(case)
+    assert [len(found[pair]) for pair in range(5)] == expected
+    for pair, many_points in contacts(whole).items():
+        if pair not in single:
+            np.testing.assert_array_equal(np.array([gap for *_, gap in found[pair]]), [gap for *_, gap in many_points])
+
+
+def test_corners_of_hulls_without_a_face_are_not_looked_at():
+    case = many(16)
+    case.hulls.flat[:] = 0
+    case.hulls.corner[:] = np.nan
+    before = [array.copy() for array in case.meetings]
+    assert widen(*case)
+    for array, same in zip(case.meetings, before, strict=True):
+        np.testing.assert_array_equal(array, same)
 
 
 def test_nothing_listed():

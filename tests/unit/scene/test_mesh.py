@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from verlet_numba.scene import rigidity
+from verlet_numba.scene import hulls, rigidity
 from verlet_numba.scene.mesh import mesh, tetrahedral_sticks, volume
 from verlet_numba.scene.shapes import ShapeError
 
@@ -161,6 +161,7 @@ def test_sticks_of_what_is_not_convex_stay_within_it(written):
 
 def test_what_is_not_convex_needs_the_extra(written, monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)
+    hulls._cut.cache_clear()
     with pytest.raises(ShapeError, match=r'pip install "verlet-numba\[mesh\]"') as error:
         mesh(written(NOT_CONVEX["L"]), mass=1)
     assert error.value.key == "file"

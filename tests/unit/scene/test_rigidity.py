@@ -72,3 +72,20 @@ def test_growing_leaves_face_connected_tetrahedra_alone():
     assert len(strip) == 3 * 600 - 6
     assert len(rigidity.brace(helix, strip)) == len(strip)
     assert len(rigidity.brace(helix, strip[:-1])) > len(strip) - 1
+
+
+def test_what_grows_together_is_rigid_and_takes_no_large_matrix(monkeypatch):
+    k = np.arange(300)
+    helix = np.stack([np.cos(2.3 * k), np.sin(2.3 * k), 0.3 * k], axis=1)
+    strip = np.concatenate([np.stack([k[:-step], k[step:]], axis=1) for step in (1, 2, 3)])
+    monkeypatch.setattr(rigidity, "rigidity_matrix", None)
+    assert rigidity.is_rigid(helix, strip)
+    assert len(rigidity.brace(helix, strip)) == len(strip)
+    assert not rigidity.holds_together(helix, strip[:-1])
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_flat_and_small_bodies_are_left_to_the_rank(count):
+    line = np.arange(count)[:, None] * [1.0, 0, 0]
+    assert rigidity.is_rigid(line, all_pairs(count))
+    assert not rigidity.holds_together(line, all_pairs(count))
