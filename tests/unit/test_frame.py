@@ -17,17 +17,17 @@ MEASURES = {"kinetic_energy": [b.KINETIC], "potential_energy": [b.POTENTIAL], "t
 
 @pytest.fixture(scope="module")
 def twin():
-    """24 frames with every effect, in which bodies meet colliders and not each other."""
-    return Twin(*worlds.placed(worlds.APART)).frames(24)
+    """18 frames with every effect, in which bodies meet colliders and not each other."""
+    return Twin(*worlds.placed(worlds.APART)).frames(18)
 
 
 def test_every_frame_is_that_of_the_twin(twin):
-    positions, velocities, measures = worlds.advanced(worlds.started(worlds.APART), 24)
+    positions, velocities, measures = worlds.advanced(worlds.started(worlds.APART), 18)
     np.testing.assert_allclose(positions[:12], twin[0][:12], atol=1e-10)
     np.testing.assert_allclose(positions, twin[0], atol=1e-7)       # what tumbles and bounces magnifies rounding
     np.testing.assert_allclose(velocities, twin[1], atol=1e-5)
     for name, columns in MEASURES.items():
-        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(24, -1), rtol=1e-5, atol=1e-5, err_msg=name)
+        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(18, -1), rtol=1e-5, atol=1e-5, err_msg=name)
 
 
 def test_the_scene_of_the_twin_calls_for_everything(twin):
@@ -36,6 +36,19 @@ def test_the_scene_of_the_twin_calls_for_everything(twin):
     assert [name for name, effect in effects.items() if effect is None] == ["features"]
     assert twin[2]["contacts"].sum() >= 25
     assert twin[2]["penetration_max"].max() > 1e-4
+
+
+def test_bodies_of_the_scene_of_everything_meet():
+    """Rigid ones colliders and each other, deformable ones rigid ones."""
+    model = worlds.started(worlds.EVERYTHING)
+    worlds.advanced(model, 8)
+    until = model.world.effects.touches.until
+    assert 0 < until[0] < until[1] < until[2]
+    bodies = model.world.effects.hulls.body
+    pairs = model.world.effects.meet.pairs
+    met = model.world.effects.meet.meetings
+    kinds = {tuple(sorted(np.sign(bodies[[pairs.first[p], pairs.second[p]]] + 0.5))) for p in met.pair[:met.listed[0]]}
+    assert kinds == {(-1, 1), (1, 1)}
 
 
 def test_growing_the_room_for_contacts_changes_no_bit(monkeypatch):
@@ -47,6 +60,7 @@ def test_growing_the_room_for_contacts_changes_no_bit(monkeypatch):
     for one, other in zip(roomy, worlds.advanced(model, 12), strict=True):
         np.testing.assert_array_equal(one, other)
     assert model.world.effects.contact.particle.size > 2
+    assert model.world.effects.mixed.meetings.pair.size > 2
 
 
 def test_single_precision_follows_for_a_while(twin):
