@@ -51,7 +51,7 @@ def e1(count: int, **solver: Any) -> Scene:
 def e2(obstacle: str, side: int, **solver: Any) -> Scene:
     """A cloth of side x side particles falls on the cube or the rope. Its spheres leave no hole."""
     scene = scene_of(f"cloth_on_{obstacle}.yaml", solver)
-    sheet = next(body for body in scene["bodies"] if body["kind"] == "cloth")
+    sheet = scene["bodies"][-1]
     sheet["resolution"], sheet["thickness"] = [side, side], 0.98 * sheet["size"][0] / (side - 1)
     return scene
 
@@ -146,6 +146,13 @@ def depth_in_box(points: Array, radius: float, centre: Array, size: Array) -> fl
 def depth_in_spheres(points: Array, others: Array, reach: float) -> float:
     """How deeply spheres about points (N, 3) are in those about others (M, 3) [m], `reach` the sum of their radii."""
     return max(0.0, reach - float(cKDTree(others).query(points)[0].min()))
+
+
+def depth_in_itself(points: Array, rest: Array, diameter: float) -> float:
+    """How deeply spheres about points (N, 3) overlap that do not at `rest` (N, 3) [m]; 0 if none do."""
+    pairs = cKDTree(points).query_pairs(diameter, output_type="ndarray")
+    now, then = (np.linalg.norm(each[pairs[:, 1]] - each[pairs[:, 0]], axis=1) for each in (points, rest))
+    return float((diameter - now)[then >= diameter].max(initial=0.0))
 
 
 @click.command()

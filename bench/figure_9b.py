@@ -2,7 +2,7 @@
 
 Writes figure_9b.csv and figure_9b.png: a cloth falls on a cube and on a rope, by the paper's method, by the program's
 default and by the scene's own solver, with strain and penetration beside: a cloth that is quick but stretches, or falls
-through, is no result. Penetration is that of the spheres around particles, from positions in all frames. Times are of the
+through, is no result. Penetration is that of the spheres around particles, from the positions of all frames. Times are of the
 processor in one thread.
 """
 
@@ -12,7 +12,19 @@ from typing import Any
 
 import click
 import report
-from experiments import RESULTS, Array, Scene, advanced, bodies_of, depth_in_box, depth_in_spheres, e2, started, strain
+from experiments import (
+    RESULTS,
+    Array,
+    Scene,
+    advanced,
+    bodies_of,
+    depth_in_box,
+    depth_in_itself,
+    depth_in_spheres,
+    e2,
+    started,
+    strain,
+)
 from report import Figure, figure
 
 STUDY = "figure 9b"
@@ -24,9 +36,9 @@ Curves = dict[tuple[str, str], dict[int, float]]
 
 
 def depth(scene: Scene, cloth: Array, others: Array) -> float:
-    """How deeply the cloth's particles (N, 3), each a ball, are in the obstacle [m]."""
-    sheet = next(body for body in scene["bodies"] if body["kind"] == "cloth")
-    cubes = [collider for collider in scene["colliders"] if collider["kind"] == "box"] if "colliders" in scene else []
+    """How deeply the cloth's particles (N, 3), each a ball, are in the obstacle [m]; others (M, 3): those of the first body."""
+    sheet = scene["bodies"][-1]
+    cubes = [collider for collider in scene["colliders"] if collider["kind"] == "box"]
     if cubes:
         return depth_in_box(cloth, sheet["thickness"] / 2, cubes[0]["position"], cubes[0]["size"])
     return depth_in_spheres(cloth, others, (sheet["thickness"] + scene["bodies"][0]["thickness"]) / 2)
@@ -41,12 +53,13 @@ def fall(obstacle: str, side: int, setting: str, count: int, repetitions: int, c
         positions, seconds = advanced(model, count)
         rates.append(count / seconds)
     cloth = bodies_of(model, positions, len(model.bodies) - 1)[:, 0]
-    others = bodies_of(model, positions, 0)[:, 0]
+    others, thickness = bodies_of(model, positions, 0)[:, 0], scene["bodies"][-1]["thickness"]
     found = figure(STUDY, case, "frames a second", "1/s", rates)
     curves.setdefault((obstacle, setting), {})[side] = found.median
     yield found
     yield figure(STUDY, case, "mean structural strain, end", "1", strain(cloth[-1].reshape(side, side, 3), 1 / (side - 1)))
-    yield figure(STUDY, case, "deepest penetration", "m", max(depth(scene, *each) for each in zip(cloth, others, strict=True)))
+    yield figure(STUDY, case, "deepest in the obstacle", "m", max(depth(scene, *each) for each in zip(cloth, others, strict=True)))
+    yield figure(STUDY, case, "deepest in itself", "m", max(depth_in_itself(each, cloth[0], thickness) for each in cloth))
 
 
 def draw(curves: Curves, where: str, path: Path) -> None:
