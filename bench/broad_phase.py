@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from report import Figure, figure
 from timing import computed, interleaved
 
-from verlet_numba.buffers import Hulls, Pairs
-from verlet_numba.kernels.broad import all_pairs, search_for, sweep
+from verlet_numba.buffers import Hulls
+from verlet_numba.kernels.broad import all_pairs, sweep
 from verlet_numba.kernels.candidates import KEPT, RENEWED, refresh
+from verlet_numba.scene.capacity import pairs_of
+from verlet_numba.scene.capacity import search_of as search_for
 
 RESULTS = Path(__file__).parent / "results"
 STUDY = "broad phase"
@@ -100,9 +102,9 @@ def kept(size: int, quick: bool) -> Figure:
     """Microseconds to find that a list still holds."""
     centre, radius, body, still = scenes("icosahedra", size)
     none, room = np.zeros(0, np.int64), 20 * size
-    hulls = Hulls(body, none, none, none, np.zeros((3, 0)), centre[0].copy(), radius[0].copy(), np.zeros(size), none, none, none)
-    pairs, spare = (Pairs(np.zeros(1, np.int64), *np.zeros((2, room), np.int64), np.zeros((3, room)), np.zeros((6, room), np.int64))
-                    for _ in range(2))
+    hulls = Hulls(body, none, none, none, np.zeros((3, 0)), centre[0].copy(), none, np.zeros((3, 0)), radius[0].copy(),
+                  np.zeros(size), none, none, none, none)
+    pairs, spare = pairs_of(room), pairs_of(room)
     search, rounds = search_for(size, room), WORK[quick] // 500
     if refresh(hulls, still, pairs, spare, search, 0.01, 4, False) != RENEWED:
         raise AssertionError("no list was made")

@@ -17,9 +17,12 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from timing import computed, interleaved
 
-from verlet_numba.buffers import Hulls, Meetings, Pairs
+from verlet_numba.buffers import Hulls, Pairs
 from verlet_numba.kernels.gjk import MET, gjk
-from verlet_numba.kernels.narrow import collide, scratch
+from verlet_numba.kernels.narrow import collide
+from verlet_numba.scene.capacity import meetings_of
+from verlet_numba.scene.capacity import narrow_of as scratch
+from verlet_numba.scene.capacity import pairs_of as empty_pairs
 from verlet_numba.scene.shapes import icosahedron
 
 Floats = NDArray[np.float64]
@@ -43,14 +46,18 @@ def poses(rng: np.random.Generator) -> Floats:
 def hulls_of(corners: Floats) -> Hulls:
     """The bodies as hulls whose corners are scanned."""
     bodies = len(corners)
-    return Hulls(np.full(bodies, -1), CORNERS * np.arange(bodies + 1), np.full(bodies, CORNERS), np.full(bodies * CORNERS, -1),
-                 np.ascontiguousarray(corners.reshape(-1, 3).T), np.ascontiguousarray(corners.mean(axis=1).T),
-                 np.full(bodies, 1.0 + 1e-9), np.zeros(bodies), np.full(bodies, -1), np.zeros(1, np.int64), np.zeros(0, np.int64))
+    none, corner = np.full(bodies, -1), np.ascontiguousarray(corners.reshape(-1, 3).T)
+    return Hulls(body=none, start=CORNERS * np.arange(bodies + 1), size=np.full(bodies, CORNERS),
+                 particle=np.full(bodies * CORNERS, -1), corner=corner, centre=np.ascontiguousarray(corners.mean(axis=1).T),
+                 solid=none, local=np.zeros_like(corner), reach=np.full(bodies, 1.0 + 1e-9), rounding=np.zeros(bodies),
+                 flat=np.zeros_like(none), graph=none, neighbours=np.zeros(1, np.int64), neighbour=np.zeros(0, np.int64))
 
 
 def pairs_of() -> Pairs:
     """Body i and body pairs + i, knowing nothing of each other."""
-    return Pairs(np.array([PAIRS]), np.arange(PAIRS), np.arange(PAIRS, 2 * PAIRS), np.zeros((3, PAIRS)), np.full((6, PAIRS), -1))
+    pairs = empty_pairs(PAIRS)
+    pairs.listed[0], pairs.first[:], pairs.second[:], pairs.face[:] = PAIRS, np.arange(PAIRS), np.arange(PAIRS, 2 * PAIRS), -1
+    return pairs
 
 
 @njit
@@ -72,8 +79,7 @@ def narrow_jobs() -> tuple[list[Callable[[], float]], float]:
     corners = poses(rng)
     hulls, nudged = hulls_of(corners), hulls_of(corners + NUDGE * rng.normal(size=(2 * PAIRS, 1, 3)))
     narrow, pairs = scratch(hulls), pairs_of()
-    meetings = Meetings(np.zeros(1, np.int64), np.zeros(PAIRS, np.int64), np.zeros((6, PAIRS), np.int64), np.zeros((6, PAIRS)),
-                        np.zeros((3, PAIRS)), np.zeros(PAIRS))
+    meetings = meetings_of(PAIRS)
     arguments = (hulls.corner, hulls.start, hulls.centre, hulls.neighbours, hulls.neighbour, narrow.seen, narrow.vertex,
                  narrow.label, narrow.weight)
 

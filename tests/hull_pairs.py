@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from verlet_numba.buffers import Hulls, Meetings, Pairs
+from verlet_numba.buffers import Hulls
+from verlet_numba.scene.capacity import meetings_of
+from verlet_numba.scene.capacity import pairs_of as empty_pairs
 
 
 def hulls_of(points, roundings=None, graphs=()):
@@ -25,20 +27,23 @@ def hulls_of(points, roundings=None, graphs=()):
     rounding = np.zeros(len(points)) if roundings is None else np.asarray(roundings, float)
     centre = np.array([np.mean(p, axis=0) for p in points]).T
     reach = np.array([np.linalg.norm(p - c, axis=1).max() for p, c in zip(points, centre.T, strict=True)]) + rounding
-    return Hulls(np.full(len(points), -1), start, sizes, np.full(start[-1], -1), np.ascontiguousarray(corner.T, float),
-                 np.ascontiguousarray(centre), reach, rounding, graph, np.array(ends), np.array(neighbour, np.int64))
+    none, corner = np.full(len(points), -1), np.ascontiguousarray(corner.T, float)
+    return Hulls(body=none, start=start, size=sizes, particle=np.full(start[-1], -1), corner=corner,
+                 centre=np.ascontiguousarray(centre), solid=none, local=np.zeros_like(corner), reach=reach, rounding=rounding,
+                 flat=np.zeros_like(none), graph=graph, neighbours=np.array(ends), neighbour=np.array(neighbour, np.int64))
 
 
 def pairs_of(first, second):
     """Pairs that know nothing yet."""
     first, second = np.array(first, np.int64).reshape(-1), np.array(second, np.int64).reshape(-1)
-    return Pairs(np.array([len(first)]), first, second, np.zeros((3, len(first))), np.full((6, len(first)), -1))
+    pairs = empty_pairs(len(first))
+    pairs.listed[0], pairs.first[:], pairs.second[:], pairs.face[:] = len(first), first, second, -1
+    return pairs
 
 
 def meetings_for(room):
     """Room for meetings."""
-    return Meetings(np.zeros(1, np.int64), np.zeros(room, np.int64), np.zeros((6, room), np.int64), np.zeros((6, room)),
-                    np.zeros((3, room)), np.zeros(room))
+    return meetings_of(room)
 
 
 def witnesses(hulls, meetings):
@@ -57,7 +62,7 @@ def difference_depth(first, second):
 def distance(first, second, axis=None, bound=np.inf, graphs=()):
     """GJK on two sets of corners (n, 3): how it ended, the number of vertices, v, and the simplex' labels and weights."""
     from verlet_numba.kernels.gjk import gjk
-    from verlet_numba.kernels.narrow import scratch
+    from verlet_numba.scene.capacity import narrow_of as scratch
     hulls = hulls_of([first, second], graphs=graphs)
     narrow = scratch(hulls)
     start = hulls.centre[:, 0] - hulls.centre[:, 1] if axis is None else np.asarray(axis, float)
@@ -68,7 +73,8 @@ def distance(first, second, axis=None, bound=np.inf, graphs=()):
 
 def meet(first, second, roundings=(0.0, 0.0), margin=np.inf):
     """The meeting of two sets of corners (n, 3): normal, gap, the points of either, and how many corners carry each."""
-    from verlet_numba.kernels.narrow import collide, scratch
+    from verlet_numba.kernels.narrow import collide
+    from verlet_numba.scene.capacity import narrow_of as scratch
     hulls, meetings = hulls_of([first, second], roundings), meetings_for(1)
     assert collide(hulls, pairs_of([0], [1]), meetings, scratch(hulls), margin, None)
     if meetings.listed[0] == 0:

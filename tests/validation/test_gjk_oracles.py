@@ -11,7 +11,8 @@ import pytest
 from hull_pairs import hulls_of, meetings_for, pairs_of, witnesses
 from scipy.spatial import ConvexHull
 
-from verlet_numba.kernels.narrow import collide, scratch
+from verlet_numba.kernels.narrow import collide
+from verlet_numba.scene.capacity import narrow_of as scratch
 
 RELATIVE = 1e-9
 BATCH = 1000

@@ -80,7 +80,8 @@ def part_features(position, inverse_mass, meet, hulls, features, which):
     x, y, z = position[0], position[1], position[2]
     corner, weight, normal, pair = meet.meetings.corner, meet.meetings.weight, meet.meetings.normal, meet.meetings.pair
     one, other, corners, particle, rounding = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, hulls.rounding
-    push, give, point, mass = meet.meetings.push, meet.meetings.give, features.point, features.mass if which == HULLS else features.mass_point
+    push, give, point = meet.meetings.push, meet.meetings.give, features.point
+    mass = features.mass if which == HULLS else features.mass_point
     for m in range(meet.meetings.listed[0]):
         g, h = one[pair[m]], other[pair[m]]
         nx, ny, nz = normal[0, m], normal[1, m], normal[2, m]

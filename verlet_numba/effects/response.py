@@ -123,8 +123,10 @@ def point_of(x, y, z, corner, weight, m, side):
 @inlined
 def shift_of(step, moved, kick, e, rx, ry, rz):
     """Displacement of entity e at the arm r since the start of the substep, what its velocity was given included."""
-    ox, oy, oz = step[e, 3] + moved[e, 3] + kick[e, 3], step[e, 4] + moved[e, 4] + kick[e, 4], step[e, 5] + moved[e, 5] + kick[e, 5]
-    return (step[e, 0] + moved[e, 0] + kick[e, 0] + (oy * rz - oz * ry), step[e, 1] + moved[e, 1] + kick[e, 1] + (oz * rx - ox * rz),
+    ox, oy, oz = (step[e, 3] + moved[e, 3] + kick[e, 3], step[e, 4] + moved[e, 4] + kick[e, 4],
+                  step[e, 5] + moved[e, 5] + kick[e, 5])
+    return (step[e, 0] + moved[e, 0] + kick[e, 0] + (oy * rz - oz * ry),
+            step[e, 1] + moved[e, 1] + kick[e, 1] + (oz * rx - ox * rz),
             step[e, 2] + moved[e, 2] + kick[e, 2] + (ox * ry - oy * rx))
 
 

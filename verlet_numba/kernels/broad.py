@@ -20,7 +20,6 @@ import math
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import Array, Search
 
 GRIDS = 48                      # the last takes all that is smaller still
 SMALLEST = 64                   # cells of a grid; from here on no two neighbours of a cell are the same cell
@@ -34,19 +33,6 @@ FOLDS = 4                       # of a dense grid upon itself, at most
 BATCH = 32
 NO_ROOM = -1
 ZERO = np.int64(0)              # of no literal type, for which kernels would be compiled once more
-
-
-def search_for(hulls: int, room: int) -> Search:
-    """The search for pairs among so many hulls, with room for so many pairs; no list has been made."""
-    def real(*shape: int) -> Array:
-        return np.zeros(shape)
-
-    def whole(*shape: int) -> Array:
-        return np.zeros(shape, np.int64)
-
-    return Search(whole(1), real(3, hulls), real(hulls), real(2, 3, hulls), whole(1), real(hulls), whole(hulls), whole(hulls),
-                  real(GRIDS), whole(4, GRIDS), whole(4 * hulls + GRIDS * (SMALLEST + 4) + 2), real(2 * hulls, 4), whole(2 * hulls),
-                  whole(room))
 
 
 @formula

@@ -5,12 +5,10 @@ difference and the origin still projects into it, it is the contact, and neither
 A lost face and the vertex opposite to it are where the next search begins.
 """
 
-from typing import Any
 
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import Hulls, Narrow
 from verlet_numba.kernels.gjk import APART, MET, gjk
 from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
 from verlet_numba.kernels.meeting import holds, write
@@ -19,20 +17,8 @@ from verlet_numba.physics.simplex import areas, cross, dot, segment, triangle
 
 ROUNDING = 1e-14        # of a hull's reach and its centre's coordinates: differences of heights that mean nothing
 TOUCHING = 1e4          # such differences: a distance that gives no normal
-POLYTOPE = 128          # vertices of a hulls' difference that the search for a hit face may use
 
 KEPT, AWAY, LOST, ELSEWHERE = 0, 1, 2, 3        # what became of what a pair learnt
-
-
-def scratch(hulls: Hulls) -> Narrow:
-    """Scratch for these hulls."""
-    faces, corners = 2 * POLYTOPE - 4, int(hulls.size.max(initial=0))
-
-    def whole(*shape: int) -> Any:
-        return np.zeros(shape, np.int64)
-
-    return Narrow(np.zeros((3, POLYTOPE)), whole(2, POLYTOPE), np.zeros(4), whole(3, faces), whole(3, faces), np.zeros((4, faces)),
-                  whole(faces), whole(3 * faces + 3), whole(3 * faces + 3), whole(2 * corners + 1))
 
 
 @kernel

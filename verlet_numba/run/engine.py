@@ -14,7 +14,7 @@ from verlet_numba.effects.wind import blow
 from verlet_numba.frame import FULL, OK, PAUSED, advance
 from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
-from verlet_numba.scene.meeting import roomier
+from verlet_numba.scene.capacity import roomier
 
 BUDGET = 64                 # substeps between two looks at signals, at first
 PAUSE_SECONDS = 0.1         # the budget doubles while it is done sooner

@@ -126,8 +126,9 @@ def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, 
     if not scene.colliders:
         return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
-    return Contacts(solids_of(scene)[1], gate(radius, real), gate(belongs if whole else np.full(size, -1), np.int64),
-                    gate(belongs >= 0, np.int64), gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
+    answers = belongs if whole else np.full(size, -1)
+    return Contacts(solids_of(scene)[1], gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
+                    gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
                     gate(np.zeros(size), np.float64), gate(np.zeros(size), np.int64),
                     gate(np.zeros(size), np.float64), gate(np.full(size, -2), np.int64))
 

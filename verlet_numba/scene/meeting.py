@@ -10,20 +10,14 @@ from verlet_numba.buffers import (
     PRINTED,
     Array,
     Contacts,
-    Effects,
     Features,
     Friction,
     Hulls,
-    Manifold,
     Meet,
-    Meetings,
     Mixed,
     Moving,
-    Narrow,
-    Pairs,
     Restitution,
     Rigid,
-    Search,
     Spheres,
     Touches,
     Trees,
@@ -31,21 +25,20 @@ from verlet_numba.buffers import (
     gate,
 )
 from verlet_numba.scene.body import Body, Floats, Integers
-from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, room, solids_of
+from verlet_numba.scene.capacity import manifold_of, meetings_of, narrow_of, pairs_of, search_of
+from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, solids_of
 from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests_on_faces
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.numbering import Numbering
-from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of, with_room
+from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.sphere_trees import candidates_of, layered_of, spheres_of, stack_of, wrapped
 
 POINTS = {"feature": FEATURE, "body": BODY, "printed": PRINTED}
 MEETING_MARGIN = 0.02       # of the smallest hull's reach: how near two hulls are a contact
+LASTING = 4                 # substeps that a list of pairs of hulls shall last: longer ones hold more pairs
 LISTING_MARGIN = 0.5        # of the deformable bodies' spacing: how near particles are listed as candidates
-POLYTOPE = 128              # vertices of a hulls' difference that the search for a hit face may use
-GRIDS, CELLS = 48, 64       # of the search for pairs: grids, and their fewest cells
-POINTS_A_PAIR = 64          # of a manifold in the making
 
 
 class Contact(NamedTuple):
@@ -130,7 +123,8 @@ def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, togethe
     count = len(points.body) - len(particles)
     hull = np.full(size, -1)
     hull[particles] = count + np.arange(len(particles))
-    mixed = Mixed(candidates_of(FIRST_ROOM), gate(np.zeros((3, size)), real), gate(hull, np.int64), whole(count + 1),
+    mixed = Mixed(candidates_of(FIRST_ROOM), gate(np.zeros((3, size)), real), gate(hull, np.int64),
+                  gate(np.zeros(count + 1), np.int64),
                   pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), meetings_of(FIRST_ROOM), narrow_of(points),
                   LISTING_MARGIN * spacing_of(soft), near, 1)
     return trees, spheres, points, mixed
@@ -152,7 +146,7 @@ def wrapped_hulls(bodies: list[Body], numbering: Numbering) -> Wrapped | None:
 def body_masses(bodies: list[Body], numbering: Numbering, inverse_mass: Floats, hulls: Hulls | None) -> Array:
     """(H,) the mass of each hull's body, a particle's own, or infinite; kg."""
     if hulls is None:
-        return real_(0)
+        return gate(np.zeros(0), np.float64)
     masses = [np.full(len(index), body.shape.masses.sum()) for body, index in rigid_bodies(bodies, numbering)]
     mass = np.concatenate([*masses, [np.inf]])[hulls.body]         # the last is what number -1 finds
     lead = hulls.particle[hulls.start[:-1]]
@@ -171,90 +165,8 @@ def still_hulls(hulls: Hulls, belongs: Integers, inverse_mass: Floats) -> Array:
 def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
     """How the hulls of a scene meet."""
     reach = hulls.reach[hulls.body >= 0]
-    several = scene.solver.response == "body"
+    as_whole = scene.solver.response == "body"
+    manifold = manifold_of(int(hulls.size.max()), FIRST_ROOM) if as_whole and rests_on_faces(hulls) else None
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
-                narrow_of(hulls), manifold_of(int(hulls.size.max()), FIRST_ROOM) if several and rests_on_faces(hulls) else None, meetings_of(FIRST_ROOM),
-                MEETING_MARGIN * float(reach.min()) if several else 0.0, scene.solver.substeps, 1,
-                1 if scene.solver.broad_phase == "all_pairs" else None)
-
-
-def whole(*shape: int) -> Array:
-    return gate(np.zeros(shape), np.int64)
-
-
-def real_(*shape: int) -> Array:
-    return gate(np.zeros(shape), np.float64)
-
-
-def pairs_of(room: int) -> Pairs:
-    """Room for so many pairs."""
-    return Pairs(whole(1), whole(room), whole(room), real_(3, room), whole(6, room), real_(room), real_(room), whole(room))
-
-
-def meetings_of(room: int) -> Meetings:
-    """Room for so many meetings."""
-    return Meetings(whole(1), whole(room), whole(6, room), real_(6, room), real_(3, room), real_(room), real_(room),
-                    real_(2, room))
-
-
-def search_of(hulls: int, room: int) -> Search:
-    """The search for pairs among so many hulls, with room for so many pairs; no list has been made."""
-    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls),
-                  real_(GRIDS), whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4), whole(2 * hulls), whole(room))
-
-
-def narrow_of(hulls: Hulls) -> Narrow:
-    """Scratch of the narrow phase of these hulls."""
-    faces, corners = 2 * POLYTOPE - 4, int(hulls.size.max(initial=0))
-    return Narrow(real_(3, POLYTOPE), whole(2, POLYTOPE), real_(4), whole(3, faces), whole(3, faces), real_(4, faces),
-                  whole(faces), whole(3 * faces), whole(3 * faces), whole(2 * corners + 1))
-
-
-def manifold_of(corners: int, room: int) -> Manifold:
-    """Scratch of manifolds of hulls of at most so many corners, with room for so many meetings."""
-    return Manifold(whole(room), whole(6, room), real_(6, room), real_(room), whole(corners), real_(4, corners), whole(2, 16),
-                    real_(2, 2, 16), real_(2, 16, 16), real_(3, POINTS_A_PAIR), whole(6, POINTS_A_PAIR), real_(6, POINTS_A_PAIR),
-                    whole(POINTS_A_PAIR), real_(POINTS_A_PAIR))
-
-
-def roomier(effects: Effects) -> Effects:
-    """The same effects with room for twice the contacts; what pairs of hulls have learnt stays with them."""
-    contact, meet, spheres, mixed, rigid, restitution = (effects.contact, effects.meet, effects.spheres, effects.mixed,
-                                                         effects.rigid, effects.restitution)
-    touching = 0
-    if contact is not None:
-        touching += 2 * contact.particle.size
-        particle, solid, normal, bound, anchor, push = room(touching)
-        contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
-        if restitution is not None:
-            restitution = restitution._replace(rebound=real_(touching))
-    if meet is not None:
-        capacity = 2 * meet.meetings.pair.size
-        touching += capacity
-        manifold = None if meet.manifold is None else manifold_of(meet.manifold.near.size, capacity)
-        meet = meet._replace(pairs=copied(meet.pairs, capacity), spare=pairs_of(capacity), meetings=meetings_of(capacity),
-                             search=meet.search._replace(code=whole(capacity)), manifold=manifold)
-    if spheres is not None:
-        capacity = 2 * spheres.push.size
-        spheres = spheres._replace(candidates=candidates_of(capacity), push=real_(capacity), standing=real_(capacity))
-    if mixed is not None:
-        capacity = 2 * mixed.meetings.pair.size
-        touching += capacity
-        mixed = mixed._replace(candidates=candidates_of(capacity), pairs=copied(mixed.pairs, capacity),
-                               spare=pairs_of(capacity), meetings=meetings_of(capacity))
-    touches = effects.touches
-    if rigid is not None:
-        entities = rigid.bodies + touching + 1
-        rigid = with_room(rigid, entities)
-        touches = touches_of(touching, rigid.size.size)
-    return effects._replace(contact=contact, meet=meet, spheres=spheres, mixed=mixed, rigid=rigid, touches=touches,
-                            restitution=restitution)
-
-
-def copied(pairs: Pairs, capacity: int) -> Pairs:
-    """Pairs with room for more."""
-    larger = pairs_of(capacity)
-    larger.listed[:] = pairs.listed
-    for old, new in zip(pairs[1:], larger[1:], strict=True):
-        new[..., :old.shape[-1]] = old
-    return larger
+                narrow_of(hulls), manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
+                min(scene.solver.substeps, LASTING), 1, 1 if scene.solver.broad_phase == "all_pairs" else None)

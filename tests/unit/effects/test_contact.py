@@ -6,7 +6,7 @@ import reference
 import reference_contact
 import worlds
 
-from verlet_numba.buffers import Friction, Restitution
+from verlet_numba.buffers import Restitution
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.restitution import bounce, foresee

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from verlet_numba.buffers import Hulls, Pairs
-from verlet_numba.kernels.broad import search_for
+from verlet_numba.buffers import Hulls
 from verlet_numba.kernels.candidates import FULL, KEPT, RENEWED, SLACK, refresh
+from verlet_numba.scene.capacity import pairs_of
+from verlet_numba.scene.capacity import search_of as search_for
 
 SUBSTEPS = 300
 
@@ -13,7 +14,7 @@ SUBSTEPS = 300
 def room_for(size):
     """Pairs with room for so many."""
     whole = np.int64
-    return Pairs(np.zeros(1, whole), np.zeros(size, whole), np.zeros(size, whole), np.zeros((3, size)), np.zeros((6, size), whole))
+    return pairs_of(size)
 
 
 class Crowd:
@@ -22,8 +23,8 @@ class Crowd:
     def __init__(self, centre, reach, *, body=None, still=None, room=2000, margin=0.05, horizon=8, all_pairs=False):
         size, none = len(reach), np.zeros(0, np.int64)
         body = np.arange(size) if body is None else np.array(body)
-        self.hulls = Hulls(body, none, none, none, np.zeros((3, 0)), np.array(centre, float), np.array(reach, float),
-                           np.zeros(size), none, none, none)
+        self.hulls = Hulls(body, none, none, none, np.zeros((3, 0)), np.array(centre, float), none, np.zeros((3, 0)),
+                           np.array(reach, float), np.zeros(size), none, none, none, none)
         self.still = np.zeros(size, bool) if still is None else np.array(still)
         self.pairs, self.spare, self.search = room_for(room), room_for(room), search_for(size, room)
         self.margin, self.horizon, self.all_pairs = margin, horizon, all_pairs

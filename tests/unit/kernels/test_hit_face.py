@@ -5,7 +5,8 @@ import pytest
 from hull_pairs import box, difference_depth, hulls_of, meet, meetings_for, pairs_of, rotated
 from scipy.spatial import ConvexHull
 
-from verlet_numba.kernels.narrow import collide, scratch
+from verlet_numba.kernels.narrow import collide
+from verlet_numba.scene.capacity import narrow_of as scratch
 
 SCALES = [1e-6, 1.0, 1e6]
 

@@ -85,7 +85,8 @@ def scene(pairs, capacity=100):
     listed = Pairs(np.array([m]), 2 * np.arange(m), 2 * np.arange(m) + 1, np.zeros((3, m)), np.full((6, m), -1), np.zeros(m),
                    np.zeros(m), np.zeros(m, int))
     meetings = Meetings(np.array([m]), np.full(capacity, -1), np.full((6, capacity), -1), np.full((6, capacity), np.nan),
-                        np.full((3, capacity), np.nan), np.full(capacity, np.nan))
+                        np.full((3, capacity), np.nan), np.full(capacity, np.nan), np.zeros(capacity),
+                        np.zeros((2, capacity)))
     for t, (a, _, contact, n, *_) in enumerate(pairs):
         local = np.where(contact.corner < len(a), contact.corner, contact.corner - len(a))
         meetings.corner[:, t] = local + np.repeat(start[2 * t:2 * t + 2], 3)

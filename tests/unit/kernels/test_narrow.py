@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.kernels.narrow import collide, gather_hulls, scratch
+from verlet_numba.kernels.narrow import collide, gather_hulls
+from verlet_numba.scene.capacity import narrow_of as scratch
 
 PAIRS, MARGIN = 150, 0.5
 

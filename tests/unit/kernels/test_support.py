@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hull_pairs import hulls_of
 
-from verlet_numba.kernels.narrow import scratch
 from verlet_numba.kernels.support import climbed, scanned
+from verlet_numba.scene.capacity import narrow_of as scratch
 
 
 def grid_box(n):
