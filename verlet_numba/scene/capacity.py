@@ -74,8 +74,8 @@ def roomier(effects: Effects) -> Effects:
     if meet is not None:
         capacity, hulls = 2 * meet.meetings.pair.size, meet.still.size
         if capacity > 2 * (MOST_PAIRS + PAIRS_A_HULL * hulls):
-            raise CrowdedError(f"more than {capacity // 2:,} pairs of {hulls:,} bodies and colliders touch: they stand in each other; "
-                          "give them more room")
+            raise CrowdedError(f"more than {capacity // 2:,} pairs of {hulls:,} bodies and colliders touch: they stand in each "
+                               "other; give them more room")
         touching += capacity
         manifold = None if meet.manifold is None else manifold_of(meet.manifold.near.size, capacity)
         meet = meet._replace(pairs=copied(meet.pairs, capacity), spare=pairs_of(capacity), meetings=meetings_of(capacity),

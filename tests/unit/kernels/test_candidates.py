@@ -13,7 +13,6 @@ SUBSTEPS = 300
 
 def room_for(size):
     """Pairs with room for so many."""
-    whole = np.int64
     return pairs_of(size)
 
 
