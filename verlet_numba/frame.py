@@ -6,7 +6,7 @@ the loop: within it, every look into a buffer would count the references of its 
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -31,6 +31,7 @@ from verlet_numba.effects.response import (
     respond,
     shove,
 )
+from verlet_numba.effects.rest import at_rest, depth_at_rest, free_of, hold, idle, settle, wake
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.touch import HULLS, begin_touches, touch_colliders, touch_hulls, weigh
 from verlet_numba.effects.wind import blow
@@ -52,7 +53,8 @@ def advance(world, frames, budget):
     """
     particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided, effects, solver, observed, snapshot, clock = world
     position, previous, inverse_mass, acceleration = particles
-    gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, features, friction, restitution = effects
+    (gravity, wind, drag, damping, carried, moving, contact, hulls, meet, rigid, touches, features, friction, restitution,
+     rest) = effects
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -63,6 +65,11 @@ def advance(world, frames, budget):
                 end = (clock[NUMBER] + 1) * h
                 if clock[SUBSTEP] == substeps - 1:
                     keep(position, previous, snapshot, touching(contact) + pushing(touches, features, meet))
+                settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, touches, features)
+                if idle(rest, moving):                                      # all bodies rest: no work
+                    clock[NUMBER] += 1
+                    clock[SUBSTEP] += 1
+                    continue
                 fall(acceleration, gravity)
                 blow(position, previous, acceleration, h, wind)
                 resist(position, previous, acceleration, h, drag)
@@ -70,19 +77,25 @@ def advance(world, frames, budget):
                 integrate(position, previous, acceleration, h)              # Verlet (P5)
                 carry(position, end, carried)
                 move(contact, end, moving)
+                hold(position, previous, inverse_mass, rest)
                 move_hulls(hulls, contact, moving)
                 gather(position, hulls)
                 clock[STAGE] = INTEGRATED
-            if not find_contacts(position, previous, inverse_mass, contact) or not find_meetings(hulls, meet):
-                return FULL
+            while True:
+                free = free_of(inverse_mass, rest)
+                if not find_contacts(position, previous, free, contact) or not find_meetings(hulls, meet, rest):
+                    return FULL
+                if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, moving):
+                    break
+                gather(position, hulls)
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
             touch_hulls(meet, hulls, friction, rigid, touches, HULLS)
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
-            recall_colliders(contact, rigid, touches)
-            recall_hulls(meet, rigid, touches, HULLS)
+            recall_colliders(contact, rigid, touches, clock[NUMBER])
+            recall_hulls(meet, rigid, touches, HULLS, clock[NUMBER])
             begin_features(meet, features)
             forget(runs_softness)
             forget(sticks_softness)
@@ -111,13 +124,15 @@ def advance(world, frames, budget):
             kick_back(position, previous, inverse_mass, rigid)
             rub(position, contact, friction)                                # friction (P24) has the last word
             rub_features(position, previous, inverse_mass, meet, hulls, features, friction)
+            hold(position, previous, inverse_mass, rest)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
         f = clock[FRAME]
         sound = observe(frames.measures[f], position, snapshot, observed, h)
         frames.measures[f, PENETRATION] = max(penetration(snapshot.position, inverse_mass, contact),
-                                              depth_of_hulls(snapshot.position, meet, hulls))
+                                              depth_of_hulls(snapshot.position, meet, hulls), depth_at_rest(rest))
+        frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
         if not sound:

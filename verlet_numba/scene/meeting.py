@@ -20,6 +20,7 @@ from verlet_numba.buffers import (
     Moving,
     Narrow,
     Pairs,
+    Rest,
     Restitution,
     Rigid,
     Search,
@@ -31,6 +32,7 @@ from verlet_numba.scene.colliders import FIRST_ROOM, contacts, moving, room, sol
 from verlet_numba.scene.convex import hulls_of_scene
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.numbering import Numbering
+from verlet_numba.scene.rest import rest_of
 from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of
 from verlet_numba.scene.schema import Scene
 
@@ -51,6 +53,7 @@ class Contact(NamedTuple):
     features: Features | None = None
     friction: Friction | None = None
     restitution: Restitution | None = None
+    rest: Rest | None = None
 
 
 def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Contact:
@@ -80,7 +83,8 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, inverse_m
         return Contact()
     return Contact(moving(found) if contact is not None else None, contact, hulls, meet, rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, real),
-                   restitution_of(scene, found, bodies, numbering, size, hulls, FIRST_ROOM, real))
+                   restitution_of(scene, found, bodies, numbering, size, hulls, FIRST_ROOM, real),
+                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real))
 
 
 def still_hulls(hulls: Hulls, belongs: Integers, inverse_mass: Floats) -> Array:
