@@ -24,6 +24,7 @@ KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         
 ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
 COLUMNS = 20
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
+LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 
 
 class Particles(NamedTuple):
@@ -221,6 +222,32 @@ class Touches(NamedTuple):
     answer: Array               # (T, 9) double SI; wish, 1/response, static and dynamic friction, separation to leave with,
                                 #                   inverse of the responses across (uu, uv, vv), restitution
     given: Array                # (T, 4) double kg m; push, grip in the two directions across, kick along the normal
+
+
+class Rest(NamedTuple):
+    """Which rigid bodies rest (effects/rest.py). Bodies are numbered as in Hulls.body; an island is named by one of its bodies."""
+
+    drift: float                # double m; a body none of whose particles gets farther from where it was is slow
+    wait: int                   # int 1; substeps for which all of an island must have been slow
+    awake: Array                # (1,) int 1; bodies of all kinds that move
+    kind: Array                 # (G,) int 1; LOOSE, HUNG by pins, RESTLESS: moved by a path or attached, FIXED
+    first: Array                # (G,) int 1; inner index of the first particle
+    stride: Array               # (G,) int 1; from one particle to the next
+    size: Array                 # (G,) int 1; particles
+    reach: Array                # (G,) double m; of a sphere about the first particle that holds the body wherever it touches
+    body: Array                 # (n,) int 1; rigid body of each particle, -1: none
+    free: Array                 # (n,) real 1/kg; inverse mass, 0 of what rests
+    anchor: Array               # (3, n) real m; where the particles were when their body began to be slow
+    quiet: Array                # (H,) int 1; 1: a hull that rests, or of what nothing moves
+    depth: Array                # (G,) double m; of an island at rest: how deep its hulls penetrate
+    resting: Array              # (G,) int 1; 1: at rest
+    slow: Array                 # (G,) int 1; substeps for which the body has been slow
+    since: Array                # (G,) int 1; substep after which it was put to rest
+    island: Array               # (G,) int 1; with which it rests
+    parent: Array               # (G,) int 1; of the forest of islands
+    backed: Array               # (G,) int 1; 1: pushed by what nothing moves
+    least: Array                # (G,) int 1; of an island: substeps for which all of it has been slow
+    roused: Array               # (G,) int 1; 1: an island to wake
 
 
 class Hulls(NamedTuple):
@@ -476,6 +503,7 @@ class Effects(NamedTuple):
     features: Features | None
     friction: Friction | None
     restitution: Restitution | None
+    rest: Rest | None
 
 
 class Solver(NamedTuple):

@@ -6,7 +6,7 @@ the loop: within it, every look into a buffer would count the references of its 
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -32,6 +32,7 @@ from verlet_numba.effects.response import (
     respond,
     shove,
 )
+from verlet_numba.effects.rest import at_rest, depth_at_rest, free_of, hold, idle, settle, wake
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.soft import find_mixed, find_soft
 from verlet_numba.effects.spheres import begin_spheres, deepest, part_spheres, rub_spheres, touching_spheres
@@ -57,7 +58,7 @@ def advance(world, frames, budget):
     effects, solver, observed, snapshot, clock = world[8:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
-    contact, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution = effects[6:]
+    contact, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -69,6 +70,11 @@ def advance(world, frames, budget):
                 if clock[SUBSTEP] == substeps - 1:
                     contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
                     keep(position, previous, snapshot, contacts)
+                settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, touches, features)
+                if idle(rest, moving):                                      # all bodies rest: no work
+                    clock[NUMBER] += 1
+                    clock[SUBSTEP] += 1
+                    continue
                 fall(acceleration, gravity)
                 blow(position, previous, acceleration, h, wind)
                 resist(position, previous, acceleration, h, drag)
@@ -76,13 +82,19 @@ def advance(world, frames, budget):
                 integrate(position, previous, acceleration, h)              # Verlet (P5)
                 carry(position, end, carried)
                 move(contact, end, moving)
+                hold(position, previous, inverse_mass, rest)
                 move_hulls(hulls, contact, moving)
                 gather(position, hulls)
                 gather(position, points)
                 clock[STAGE] = INTEGRATED
-            if not (find_contacts(position, previous, inverse_mass, contact) and find_meetings(hulls, meet)     # (P11 to P17)
-                    and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
-                return FULL
+            while True:                                                     # once, and again where resting bodies wake
+                free = free_of(inverse_mass, rest)
+                if not (find_contacts(position, previous, free, contact) and find_meetings(hulls, meet, rest)     # (P11 to P17)
+                        and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
+                    return FULL
+                if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, moving):
+                    break
+                gather(position, hulls)
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
@@ -91,8 +103,8 @@ def advance(world, frames, budget):
             weigh(position, previous, inverse_mass, rigid)
             link(rigid, touches)
             recall_colliders(contact, rigid, touches, clock[NUMBER])
-            recall_hulls(meet, rigid, touches, HULLS)
-            recall_hulls(mixed, rigid, touches, MIXED)
+            recall_hulls(meet, rigid, touches, HULLS, clock[NUMBER])
+            recall_hulls(mixed, rigid, touches, MIXED, clock[NUMBER])
             strike_bodies(position, inverse_mass, acceleration, contact, meet, hulls, mixed, points, friction, restitution, rigid,
                           touches, clock[NUMBER], h)
             begin_features(inverse_mass, meet, hulls, features)
@@ -133,6 +145,7 @@ def advance(world, frames, budget):
             rub_features(position, previous, inverse_mass, meet, hulls, features, friction, HULLS)
             rub_features(position, previous, inverse_mass, mixed, points, features, friction, MIXED)
             rub_spheres(position, previous, inverse_mass, spheres, friction)
+            hold(position, previous, inverse_mass, rest)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
@@ -140,7 +153,8 @@ def advance(world, frames, budget):
         sound = observe(frames.measures[f], position, snapshot, observed, h)
         frames.measures[f, PENETRATION] = max(
             penetration(snapshot.position, inverse_mass, contact), depth_of_hulls(snapshot.position, meet, hulls),
-            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points))
+            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest))
+        frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
         if not sound:

@@ -1,6 +1,6 @@
 """Rigid bodies meet each other and colliders: candidate pairs, GJK, contact points (paper, 5.1)."""
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import inlined, kernel
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.effects.features import point_of
 from verlet_numba.kernels.candidates import FULL, refresh
@@ -33,16 +33,24 @@ def move_hulls(hulls, contact, moving):
 
 
 @kernel
-def find_meetings(hulls, meet):
+def find_meetings(hulls, meet, rest):
     """List the contacts of hulls. False: more than there is room for (grow and call again)."""
     if meet is None:
         return True
     horizon, margin = meet.horizon, meet.margin
     if refresh(hulls, meet.still, meet.pairs, meet.spare, meet.search, margin, horizon, meet.all_pairs) == FULL:
         return False
-    if not collide(hulls, meet.pairs, meet.meetings, meet.narrow, margin, meet.coherent):
+    if not collide(hulls, meet.pairs, meet.meetings, meet.narrow, margin, meet.coherent, quiet_of(rest)):
         return False
     return several(hulls, meet.pairs, meet.meetings, meet.manifold)
+
+
+@kernel
+def quiet_of(rest):
+    """Which hulls need not meet each other; None: all do."""
+    if rest is None:
+        return None
+    return rest.quiet
 
 
 @kernel
@@ -63,11 +71,17 @@ def depth_of_hulls(position, meet, hulls):
     one, other, corners, particle, rounding = meet.pairs.first, meet.pairs.second, hulls.corner, hulls.particle, hulls.rounding
     deepest = 0.0
     for m in range(meet.meetings.listed[0]):
-        px, py, pz = point_of(x, y, z, corners, particle, corner, weight, m, 0)
-        qx, qy, qz = point_of(x, y, z, corners, particle, corner, weight, m, 3)
         reach = rounding[one[pair[m]]] + rounding[other[pair[m]]]
-        deepest = max(deepest, reach - (normal[0, m] * (px - qx) + normal[1, m] * (py - qy) + normal[2, m] * (pz - qz)))
+        deepest = max(deepest, reach - distance_of(x, y, z, corners, particle, corner, weight, normal, m))
     return deepest
+
+
+@inlined
+def distance_of(x, y, z, corners, particle, corner, weight, normal, m):
+    """The distance of the points of meeting m along its normal [m], with the particles at (x, y, z)."""
+    px, py, pz = point_of(x, y, z, corners, particle, corner, weight, m, 0)
+    qx, qy, qz = point_of(x, y, z, corners, particle, corner, weight, m, 3)
+    return normal[0, m] * (px - qx) + normal[1, m] * (py - qy) + normal[2, m] * (pz - qz)
 
 
 @kernel

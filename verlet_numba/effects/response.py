@@ -212,18 +212,18 @@ def recall_colliders(contact, rigid, touches, number):
 
 
 @kernel
-def recall_hulls(meet, rigid, touches, which):
+def recall_hulls(meet, rigid, touches, which, number):
     """The same between hulls: the push of a pair is shared among its contacts, which stand side by side."""
     if meet is None or rigid is None:
         return
-    pair, source, given, push = meet.meetings.pair, touches.source, touches.given, meet.pairs.push
+    pair, source, given, push, met = meet.meetings.pair, touches.source, touches.given, meet.pairs.push, meet.pairs.met
     begin, end = touches.until[which - 1], touches.until[which]
     while begin < end:
         p, last = pair[source[begin]], begin + 1
         while last < end and pair[source[last]] == p:
             last += 1
         for t in range(begin, last):
-            given[t, 0] = push[p] / (last - begin)
+            given[t, 0] = push[p] / (last - begin) if met[p] >= number - 1 else 0.0
         begin = last
 
 
@@ -250,7 +250,8 @@ def keep_hulls(meet, rigid, touches, which):
     if meet is None or rigid is None:
         return
     pair, source, given, push = meet.meetings.pair, touches.source, touches.given, meet.pairs.push
-    push[:meet.pairs.listed[0]] = 0.0
+    for t in range(touches.until[which - 1], touches.until[which]):
+        push[pair[source[t]]] = 0.0
     for t in range(touches.until[which - 1], touches.until[which]):
         push[pair[source[t]]] += given[t, 0]
 

@@ -147,11 +147,11 @@ def learn(axis, face, i, solid, sa, sb, a, b, c, d, e, f, nx, ny, nz):
 
 
 @kernel
-def collide(hulls, pairs, meetings, narrow, margin, coherent):
+def collide(hulls, pairs, meetings, narrow, margin, coherent, quiet=None):
     """Contacts of all pairs whose gap is at most `margin` [m], one a pair, in the order of the pairs.
 
-    coherent: None: every pair is met for the first time, and learns nothing. False is returned where there are more meetings
-    than there is room for: grow and call again.
+    coherent: None: every pair is met for the first time, and learns nothing. quiet (H,): two hulls that both are do not meet;
+    None: none is. False is returned where there are more meetings than there is room for: grow and call again.
     """
     points, centre, reach, rounding = hulls.corner, hulls.centre, hulls.reach, hulls.rounding
     start, size, graph, neighbours, neighbour = hulls.start, hulls.size, hulls.graph, hulls.neighbours, hulls.neighbour
@@ -163,6 +163,8 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent):
     listed, fits = 0, True
     for i in range(pairs.listed[0]):
         g, h = first[i], second[i]
+        if quiet is not None and quiet[g] and quiet[h]:
+            continue
         vx, vy, vz = centre[0, g] - centre[0, h], centre[1, g] - centre[1, h], centre[2, g] - centre[2, h]
         span = reach[g] + reach[h]
         if dot(vx, vy, vz, vx, vy, vz) > (span + margin) * (span + margin):

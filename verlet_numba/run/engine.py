@@ -122,19 +122,33 @@ class State:
     @staticmethod
     def moving(world: World) -> tuple[Array, ...]:
         """The arrays of a world that a substep leaves changed for the next."""
-        solids: tuple[Array, ...] = ()
-        if world.effects.moving is not None and world.effects.contact is not None:
-            placed = world.effects.contact.solids
-            solids = (placed.origin, placed.rotation, placed.origin_before, placed.rotation_before)
-        return (world.particles.position, world.particles.previous, world.clock, world.snapshot.counts, *solids)
+        particles, effects = world.particles, world.effects
+        contact, meet, touches, rest = effects.contact, effects.meet, effects.touches, effects.rest
+        arrays = [particles.position, particles.previous, world.clock, world.snapshot.counts]
+        if contact is not None:
+            solids = contact.solids
+            arrays += [solids.origin, solids.rotation, solids.origin_before, solids.rotation_before, contact.listed,
+                       contact.particle, contact.push, contact.kept, contact.keeper, contact.overlap, contact.met]
+        if meet is not None:
+            search, meetings = meet.search, meet.meetings
+            arrays += [*meet.pairs, search.made, search.anchor, search.extent, search.last, search.turn,
+                       meetings.listed, meetings.pair, meetings.corner, meetings.weight, meetings.normal]
+        if touches is not None:
+            arrays += [touches.until, touches.given]
+        if effects.features is not None:
+            arrays += [effects.features.push]
+        if rest is not None:
+            arrays += [rest.awake, rest.free, rest.anchor, rest.quiet, rest.resting, rest.slow, rest.since, rest.island, rest.depth]
+        return tuple(arrays)
 
     @classmethod
     def of(cls, model: Model) -> "State":
         return cls(tuple(array.copy() for array in cls.moving(model.world)))
 
     def restore(self, model: Model) -> None:
+        """Buffers of contacts may have grown since: then what was saved is the first part of them."""
         for array, saved in zip(self.moving(model.world), self.arrays, strict=True):
-            array[...] = saved
+            array[tuple(map(slice, saved.shape))] = saved
 
 
 def sound(world: World) -> bool:

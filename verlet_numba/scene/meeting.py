@@ -16,6 +16,7 @@ from verlet_numba.buffers import (
     Meet,
     Mixed,
     Moving,
+    Rest,
     Restitution,
     Rigid,
     Spheres,
@@ -31,6 +32,7 @@ from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.numbering import Numbering
+from verlet_numba.scene.rest import rest_of
 from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.sphere_trees import candidates_of, layered_of, spheres_of, stack_of, wrapped
@@ -55,6 +57,7 @@ class Contact(NamedTuple):
     features: Features | None = None
     friction: Friction | None = None
     restitution: Restitution | None = None
+    rest: Rest | None = None
 
 
 def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -84,7 +87,8 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     return Contact(moving(found) if contact is not None else None, contact, hulls, meet, trees, spheres, points, mixed,
                    rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
-                   restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real))
+                   restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
+                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real) if mixed is None else None)
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,

@@ -79,11 +79,13 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
     yield Phase("whole-body response", active.rigid is not None, "rigid bodies without pins meet colliders" if active.rigid
                 else "no rigid body without pins meets a collider")
-    for name in ("self-collision", "continuous collision", "bending", "rest", "orientation guard"):
+    for name in ("self-collision", "continuous collision", "bending", "orientation guard"):
         yield Phase(name, False, "not simulated yet")
     yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other"
                 if sum(body.copies for body in prepared.bodies) > 1 else "there is one body at most")
     yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))
+    yield Phase("rest", active.rest is not None, unnamed if effects.rest is None else named if active.rest is not None
+                else "named, but there is no rigid body that may rest on something")
     yield Phase("runs of sticks", world.runs is not None,
                 "ropes, cloth or several bodies of one kind" if world.runs else "no rope, no cloth, no body in several copies")
     yield Phase("single sticks", world.sticks is not None,
