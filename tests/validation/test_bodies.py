@@ -183,7 +183,7 @@ def pair(row):
     rng = np.random.default_rng(row)
     at = np.array([0, 4.0 * row, 1])
     return [die(f"a{row}", list(at), velocity=[2, 0, 0.3], angular_velocity=list(rng.normal(size=3) * 4)),
-            box(f"b{row}", list(at + [0.7, 0.1, 0.05]), velocity=[-2, 0.2, 0.3], angular_velocity=list(rng.normal(size=3) * 4))]
+            box(f"b{row}", list(at + np.array([0.7, 0.1, 0.05])), velocity=[-2, 0.2, 0.3], angular_velocity=list(rng.normal(size=3) * 4))]
 
 
 def test_a_pair_among_many_has_the_bits_of_the_pair_alone(simulate):

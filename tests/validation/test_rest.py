@@ -73,7 +73,7 @@ def test_a_blow_wakes_the_island_and_keeps_momentum():
     worlds.advanced(model, 1)
     mine = model.numbering.bodies[2].ravel()
     model.world.particles.previous[0, mine] -= 2.0 * model.world.solver.step
-    position, velocity, measures = worlds.advanced(model, 90)
+    _, velocity, measures = worlds.advanced(model, 90)
     speed = velocity.reshape(90, 3, 8, 3)[..., 0].mean(2)
     after = int(np.argmax(speed[:, 1] > 0.3))
     assert measures[after - 6, RESTING] == 2

@@ -164,7 +164,7 @@ def pushes(meet, features):
     """How hulls pushed each other in the last substep, and whether by pair or by meeting."""
     if features is None:
         return meet.pairs.push, True
-    return features.push, False
+    return meet.meetings.push, False
 
 
 @kernel

@@ -132,11 +132,15 @@ class State:
         if meet is not None:
             search, meetings = meet.search, meet.meetings
             arrays += [*meet.pairs, search.made, search.anchor, search.extent, search.last, search.turn,
-                       meetings.listed, meetings.pair, meetings.corner, meetings.weight, meetings.normal]
+                       *meetings]
         if touches is not None:
             arrays += [touches.until, touches.given]
-        if effects.features is not None:
-            arrays += [effects.features.push]
+        if effects.spheres is not None:
+            spheres = effects.spheres
+            arrays += [*spheres.candidates, spheres.at, spheres.push, spheres.standing]
+        if effects.mixed is not None:
+            mixed = effects.mixed
+            arrays += [*mixed.candidates, mixed.at, *mixed.pairs, *mixed.meetings]
         if rest is not None:
             arrays += [rest.awake, rest.free, rest.anchor, rest.quiet, rest.resting, rest.slow, rest.since, rest.island, rest.depth]
         return tuple(arrays)
