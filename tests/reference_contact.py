@@ -204,17 +204,23 @@ class Whole:
         return self.shift + np.cross(self.turn, contact.arm)
 
     def gripped(self, contact, push, slide):
-        """The impulse along the surface that takes back as much of the slide as friction holds under so great a push."""
+        """The impulse along the surface that takes back the slide, or else opposes it as much as friction can."""
         across = null_space(contact.normal[None])
-        wished = contact.grip - across @ np.linalg.solve(across.T @ self.answer(contact) @ across, across.T @ slide)
-        size = np.linalg.norm(wished)
-        before, contact.grip = contact.grip, wished * (held(size, push, *self.twin.friction(contact)) if size > 0 else 1.0)
-        return contact.grip - before
+        answer, slide, before = across.T @ self.answer(contact) @ across, across.T @ slide, across.T @ contact.grip
+        static, dynamic = self.twin.friction(contact)
+        grip = before - np.linalg.solve(answer, slide)
+        if np.linalg.norm(grip) > static * push:
+            grip = before - slide / np.linalg.eigvalsh(answer).max()
+            size = np.linalg.norm(grip)
+            grip *= min(1.0, dynamic * push / size) if size > 0 else 0.0
+        contact.grip = across @ grip
+        return contact.grip - across @ before
 
     def iterate(self, once):
-        """Sweep over the contacts until little changes; `once` gives what one contact changes, and how hard it pushes."""
-        for _ in range(SWEEPS):
-            changes, pushes = zip(*[once(contact) for contact in self.contacts], strict=True)
+        """Sweep over the contacts, forth and back, until little changes; `once` gives what a contact changes and its push."""
+        for sweep in range(SWEEPS):
+            contacts = self.contacts if sweep % 2 == 0 else self.contacts[::-1]
+            changes, pushes = zip(*[once(contact) for contact in contacts], strict=True)
             if max(changes) <= SETTLED * max(pushes):
                 break
 

@@ -9,11 +9,10 @@ since the start of the substep.
 
 import math
 
-from verlet_numba._jit import inlined, kernel
+from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.effects.touch import COLLIDERS
 from verlet_numba.kernels.islands import sort_islands
-from verlet_numba.physics.friction import held
 from verlet_numba.physics.pose import inward, outward, rotation
 from verlet_numba.physics.rigid import across, cross, response, times_symmetric
 
@@ -302,10 +301,10 @@ def shove(friction, rigid, touches):
     line, answer, given, twist, mass = touches.line, touches.answer, touches.given, rigid.twist, rigid.mass
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
-        for _ in range(sweeps_of(end - begin)):
+        for sweep in range(sweeps_of(end - begin)):
             change = largest = 0.0
             for o in range(begin, end):
-                t = order[o]
+                t = order[o if sweep % 2 == 0 else begin + end - 1 - o]     # forth and back: no touch is always the last
                 a, b = first[t], second[t]
                 nx, ny, nz = line[t, 0], line[t, 1], line[t, 2]
                 ux, uy, uz = relative(twist, a, b, line, t)
@@ -323,9 +322,20 @@ def shove(friction, rigid, touches):
                 break
 
 
+@formula
+def least_of(xx, xy, yy):
+    """The least eigenvalue of the matrix [[xx, xy], [xy, yy]]."""
+    return 0.5 * (xx + yy - math.sqrt((xx - yy) * (xx - yy) + 4.0 * xy * xy))
+
+
 @kernel
 def grip(friction, line, answer, given, t, push, ux, uy, uz):
-    """The impulse that takes back the slide of touch t as far as friction holds under so great a push; u: slide since aimed."""
+    """The impulse that takes back the slide of touch t as far as friction holds under so great a push; u: slide since aimed.
+
+    What sticks needs the inverse of the responses across. Where it slides, friction f shall oppose the slide s itself:
+    f <- f - s/k, cut to the cone, ends with f along -s for a number k, as it would not for a matrix; k is the matrix'
+    greatest eigenvalue, so that no step goes too far.
+    """
     if friction is None:
         return 0.0, 0.0, 0.0
     px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
@@ -334,8 +344,12 @@ def grip(friction, line, answer, given, t, push, ux, uy, uz):
     f = given[t, 1] - (answer[t, 5] * p + answer[t, 6] * q)
     g = given[t, 2] - (answer[t, 6] * p + answer[t, 7] * q)
     length = math.sqrt(f * f + g * g)
-    share = held(length, push, answer[t, 2], answer[t, 3]) if length > 0.0 else 1.0
-    f, g = share * f, share * g
+    if length > answer[t, 2] * push:                # it slides
+        least = least_of(answer[t, 5], answer[t, 6], answer[t, 7])
+        f, g = given[t, 1] - least * p, given[t, 2] - least * q
+        length = math.sqrt(f * f + g * g)
+        share = min(1.0, answer[t, 3] * push / length) if length > 0.0 else 0.0
+        f, g = share * f, share * g
     df, dg = f - given[t, 1], g - given[t, 2]
     given[t, 1], given[t, 2] = f, g
     return df * px + dg * qx, df * py + dg * qy, df * pz + dg * qz
@@ -385,10 +399,10 @@ def rebound(friction, rigid, touches):
         line[t, 9], line[t, 10], line[t, 11] = line[t, 9] + ux - vx, line[t, 10] + uy - vy, line[t, 11] + uz - vz
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
-        for _ in range(SWEEPS if end - begin <= FEW_TOUCHES else 1):
+        for sweep in range(SWEEPS if end - begin <= FEW_TOUCHES else 1):
             change = largest = 0.0
             for o in range(begin, end):
-                t = order[o]
+                t = order[o if sweep % 2 == 0 else begin + end - 1 - o]
                 if given[t, 0] == 0.0:
                     continue
                 a, b = first[t], second[t]
