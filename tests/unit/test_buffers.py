@@ -10,7 +10,7 @@ import worlds
 
 from verlet_numba import buffers
 from verlet_numba.scene.build import frames
-from verlet_numba.scene.meeting import roomier
+from verlet_numba.scene.capacity import roomier
 
 SOURCE = Path(buffers.__file__).read_text()
 COMMENT = re.compile(r"#\s+(?:\((?P<shape>[^)]*)\)\s+)?(?P<kind>real|double|int|file)\s+(?P<unit>[^;]+?)(?:;\s.+)?$")
