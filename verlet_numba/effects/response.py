@@ -129,6 +129,12 @@ def shift_of(step, moved, kick, e, rx, ry, rz):
             step[e, 2] + moved[e, 2] + kick[e, 2] + (ox * ry - oy * rx))
 
 
+@formula
+def least_of(xx, xy, yy):
+    """The least eigenvalue of the matrix [[xx, xy], [xy, yy]]."""
+    return 0.5 * (xx + yy - math.sqrt((xx - yy) * (xx - yy) + 4.0 * xy * xy))
+
+
 @kernel
 def respond(friction, rigid, touches):
     """How far the two entities of every touch give way to a unit impulse along its line, and across it."""
@@ -158,7 +164,7 @@ def respond_across(friction, line, answer, t, n, r, q, one, other):
     s = 1.0 / determinant if determinant > 0.0 else 0.0
     for e in range(3):
         line[t, 12 + e], line[t, 15 + e] = u[e], v[e]
-    answer[t, 5], answer[t, 6], answer[t, 7] = vv * s, -uv * s, uu * s
+    answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9] = vv * s, -uv * s, uu * s, least_of(vv * s, -uv * s, uu * s)
 
 
 @inlined
@@ -310,6 +316,8 @@ def shove(friction, rigid, touches):
                 ux, uy, uz = relative(twist, a, b, line, t)
                 push = max(0.0, given[t, 0] + (answer[t, 0] - (nx * ux + ny * uy + nz * uz)) * answer[t, 1])
                 j = push - given[t, 0]
+                if push == 0.0 and j == 0.0:            # apart, and it was: nothing to grip
+                    continue
                 given[t, 0] = push
                 gx, gy, gz = grip(friction, line, answer, given, t, push, ux, uy, uz)
                 jx, jy, jz = j * nx + gx, j * ny + gy, j * nz + gz
@@ -320,12 +328,6 @@ def shove(friction, rigid, touches):
                 largest = max(largest, push)
             if change <= SETTLED * largest:
                 break
-
-
-@formula
-def least_of(xx, xy, yy):
-    """The least eigenvalue of the matrix [[xx, xy], [xy, yy]]."""
-    return 0.5 * (xx + yy - math.sqrt((xx - yy) * (xx - yy) + 4.0 * xy * xy))
 
 
 @kernel
@@ -345,7 +347,7 @@ def grip(friction, line, answer, given, t, push, ux, uy, uz):
     g = given[t, 2] - (answer[t, 6] * p + answer[t, 7] * q)
     length = math.sqrt(f * f + g * g)
     if length > answer[t, 2] * push:                # it slides
-        least = least_of(answer[t, 5], answer[t, 6], answer[t, 7])
+        least = answer[t, 9]
         f, g = given[t, 1] - least * p, given[t, 2] - least * q
         length = math.sqrt(f * f + g * g)
         share = min(1.0, answer[t, 3] * push / length) if length > 0.0 else 0.0
