@@ -316,18 +316,44 @@ def shove(friction, rigid, touches):
 
 
 @formula
-def least_of(xx, xy, yy):
-    """The least eigenvalue of the matrix [[xx, xy], [xy, yy]]."""
-    return 0.5 * (xx + yy - math.sqrt((xx - yy) * (xx - yy) + 4.0 * xy * xy))
+def sliding(f, g, xx, xy, yy, r):
+    """The impulse of size r that opposes the slide which it leaves; (f, g): the one that would leave none.
+
+    With the responses K, its inverse A = (xx, xy, yy) and f0 = (f, g), the impulse f leaves the slide K (f - f0). That is
+    -a f where (1 + a A) f = f0, and a > 0 follows from |f| = r: 1/|f| is all but linear in a (More & Sorensen 1983).
+    """
+    if r == 0.0:
+        return 0.0, 0.0
+    a, p, q = 0.0, f, g
+    for _ in range(3):
+        length = math.sqrt(p * p + q * q)
+        u, v = applied(p, q, xx, xy, yy)
+        u, v = shifted(u, v, xx, xy, yy, a)
+        a += (1.0 / r - 1.0 / length) * length * length * length / (p * u + q * v)
+        p, q = shifted(f, g, xx, xy, yy, a)
+    share = r / math.sqrt(p * p + q * q)
+    return share * p, share * q
+
+
+@formula
+def applied(p, q, xx, xy, yy):
+    """A (p, q)."""
+    return xx * p + xy * q, xy * p + yy * q
+
+
+@formula
+def shifted(p, q, xx, xy, yy, a):
+    """(1 + a A)^-1 (p, q)."""
+    x, y, z = 1.0 + a * xx, a * xy, 1.0 + a * yy
+    s = 1.0 / (x * z - y * y)
+    return (z * p - y * q) * s, (x * q - y * p) * s
 
 
 @kernel
 def grip(friction, line, answer, given, t, push, ux, uy, uz):
     """The impulse that takes back the slide of touch t as far as friction holds under so great a push; u: slide since aimed.
 
-    What sticks needs the inverse of the responses across. Where it slides, friction f shall oppose the slide s itself:
-    f <- f - s/k, cut to the cone, ends with f along -s for a number k, as it would not for a matrix; k is the matrix'
-    greatest eigenvalue, so that no step goes too far.
+    All of it within the static cone; else as much as dynamic friction has, against the slide that remains.
     """
     if friction is None:
         return 0.0, 0.0, 0.0
@@ -337,12 +363,8 @@ def grip(friction, line, answer, given, t, push, ux, uy, uz):
     f = given[t, 1] - (answer[t, 5] * p + answer[t, 6] * q)
     g = given[t, 2] - (answer[t, 6] * p + answer[t, 7] * q)
     length = math.sqrt(f * f + g * g)
-    if length > answer[t, 2] * push:                # it slides
-        least = least_of(answer[t, 5], answer[t, 6], answer[t, 7])
-        f, g = given[t, 1] - least * p, given[t, 2] - least * q
-        length = math.sqrt(f * f + g * g)
-        share = min(1.0, answer[t, 3] * push / length) if length > 0.0 else 0.0
-        f, g = share * f, share * g
+    if length > answer[t, 2] * push:
+        f, g = sliding(f, g, answer[t, 5], answer[t, 6], answer[t, 7], min(answer[t, 3] * push, length))
     df, dg = f - given[t, 1], g - given[t, 2]
     given[t, 1], given[t, 2] = f, g
     return df * px + dg * qx, df * py + dg * qy, df * pz + dg * qz
