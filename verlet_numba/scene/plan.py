@@ -13,6 +13,7 @@ from verlet_numba.scene.prepare import Prepared
 from verlet_numba.scene.schema import Scene
 
 INTERPRETER = 190 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
+MEETING = 40 << 20          # and of SciPy and more kernels, where bodies meet each other
 BUILDING = 1.4              # times the buffers: the bodies, their numbering, and what the file says of them
 CHUNK_BYTES = 2 << 20       # of a chunk of frames on its way to the file, at most
 FRAME_MEASURES = COLUMNS * 8 + 10 * 8       # bytes of a frame's observables, time and step, and offsets for VTK
@@ -41,8 +42,13 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
         "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot),
                     "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
-        "memory_bytes": INTERPRETER + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
+        "memory_bytes": INTERPRETER + MEETING * bodies_meet(model.world) + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
         "file_bytes_at_most": file_bytes(prepared, model)}
+
+
+def bodies_meet(world: World) -> bool:
+    """Whether any two bodies may touch."""
+    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed))
 
 
 def frame_count(scene: Scene) -> int:
