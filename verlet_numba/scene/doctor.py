@@ -14,7 +14,8 @@ from verlet_numba.scene.problems import Path as Key
 from verlet_numba.scene.problems import Problem
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_colliders import Collider
-from verlet_numba.scene.shapes import edges, stick_lengths
+from verlet_numba.scene.shapes import stick_lengths
+from verlet_numba.scene.slipping import slipping, substeps_a_second
 from verlet_numba.scene.source import Source
 
 Warnings = Iterator[tuple[Key, str]]
@@ -30,9 +31,8 @@ def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> l
     surfaces, _ = load_surfaces(scene, folder, source)
     found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies)]
     if scene.effects.contact != "none":
-        found += [*inside_colliders(scene, bodies, surfaces), *too_fast(scene, bodies),
-                  *too_coarse(scene, bodies),
-                  *overlaps(scene, bodies), *not_simulated(bodies)]
+        found += [*inside_colliders(scene, bodies, surfaces), *overlaps(scene, bodies), *selves(scene, bodies),
+                  *cramped(scene, bodies), *slipping(scene, bodies), *rebounds(scene, bodies)]
     found += [*resolution(scene, bodies), *lost_gravity(scene, bodies)]
     return [source.problem(path, message) for path, message in found]
 
@@ -107,6 +107,25 @@ def attachments(scene: Scene, bodies: list[Body]) -> Warnings:
                          "substeps")
 
 
+def cramped(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Attached particles whose contact works against the attachment: only the two themselves are left out of it."""
+    named = {body.name: body for body in bodies}
+    for row, (a, p, b, q) in enumerate(scene.attachments):
+        for name, i, partner, j in ((a, p, b, q), (b, q, a, p)):
+            soft, body = named[name].shape, named[partner]
+            if soft.rigid or name == partner:
+                continue
+            beside = soft.sticks[(soft.sticks == i).any(axis=1)].sum(axis=1) - i
+            places = named[name].positions[0]
+            reach = soft.radius + body.shape.radius
+            if body.shape.rigid and soft.radius > 0:
+                yield ("attachments", row), (f"{name} has a thickness, by which {partner}, a rigid body, pushes the attached "
+                                             "particle away: the two pull at each other; make it 0")
+            elif (np.linalg.norm(places[beside] - body.positions.reshape(-1, 3)[j], axis=1) < reach * (1 - TOUCH)).any():
+                yield ("attachments", row), (f"the sphere of {partner} pushes the neighbours of the attached particle of {name} "
+                                             "away: the two pull at each other; make them thinner")
+
+
 def inside_colliders(scene: Scene, bodies: list[Body], surfaces: dict[int, Surface]) -> Warnings:
     """Free particles that start inside a collider, their radius counted. Scattered copies are clear of all."""
     for index, body in enumerate(bodies):
@@ -125,64 +144,29 @@ def _with_surfaces(scene: Scene, surfaces: dict[int, Surface]) -> Iterator[tuple
     return ((collider, surfaces.get(index)) for index, collider in enumerate(scene.colliders))
 
 
-def too_fast(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Particles whose first substep takes them further than a collider is thick: they may never be found inside."""
-    step = _step(scene)
-    thin = [(collider, *_thickness(collider)) for collider in scene.colliders if collider.kind in _THICKNESS]
+def selves(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Bodies that are to meet themselves, and cannot."""
+    soft = [index for index, body in enumerate(bodies) if not body.shape.rigid]
+    if scene.effects.self_collision and not soft:
+        yield ("effects", "self_collision"), "does nothing: there is no cloth, no rope and no body of particles"
+    for index in soft if scene.effects.self_collision else []:
+        if bodies[index].shape.radius == 0 and len(bodies[index].pinned) > 1:
+            key = "radius" if bodies[index].shape.kind == "particles" else "thickness"
+            yield ("bodies", index), f"has no {key}, so `self_collision` does nothing for it: its particles are points"
+
+
+def rebounds(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Restitution that has no effect: particles rebound from colliders, rigid bodies from planes and rooms, nobody from another."""
+    several = sum(body.copies for body in bodies) > 1
+    solid = any(collider.kind not in ("plane", "room") for collider in scene.colliders)
     for index, body in enumerate(bodies):
-        speed = float(np.linalg.norm(body.velocities, axis=2).max(initial=0))
-        for collider, thickness, own_speed in thin:
-            reach, limit = (speed + own_speed) * step, thickness + 2 * body.shape.radius
-            if reach > limit:
-                needed = int(np.ceil(scene.solver.substeps * reach / limit))
-                yield ("bodies", index), (
-                    f"moves up to {reach:.3g} m a substep, more than collider {collider.name} and its own thickness "
-                    f"({limit:.3g} m): it may pass through; use {needed} substeps")
-                break
-
-
-_THICKNESS = {
-    "box": lambda collider: min(collider.size),
-    "sphere": lambda collider: 2 * collider.radius,
-    "cylinder": lambda collider: min(2 * collider.radius, collider.length),
-}
-
-
-def _thickness(collider: Collider) -> tuple[float, float]:
-    """The least thickness of a finite collider (m), and the greatest speed along its path (m/s)."""
-    knots = np.array(collider.path or [(0, 0, 0, 0)], float)
-    steps = np.diff(knots, axis=0)
-    speeds = np.linalg.norm(steps[:, 1:], axis=1) / steps[:, 0]
-    return _THICKNESS[collider.kind](collider), float(speeds.max(initial=0))
-
-
-def not_simulated(bodies: list[Body]) -> Warnings:
-    """Bodies that would pass through each other."""
-    if sum(body.copies for body in bodies) > 1 and not all(body.pinned.all() for body in bodies):
-        yield ("bodies",), ("contact of bodies with each other is not simulated yet: they pass through each other "
-                            "(contact with colliders is)")
-
-
-def too_coarse(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Colliders that fit between neighbouring particles: only particles meet colliders."""
-    small = [(collider, _WIDTH[collider.kind](collider)) for collider in scene.colliders if collider.kind in _WIDTH]
-    for index, body in enumerate(bodies):
-        shape = body.shape
-        joined = edges(shape.triangles) if shape.rigid else shape.sticks
-        longest = float(stick_lengths(body.positions[0], joined).max(initial=0.0))
-        for collider, width in small:
-            if not body.pinned.all() and width + 2 * shape.radius < longest:
-                yield ("bodies", index), (
-                    f"its particles are up to {longest:.3g} m apart, and collider {collider.name} is {width:.3g} m wide: it "
-                    f"may slip between them, since contact of faces and edges with colliders is not simulated yet")
-                break
-
-
-_WIDTH = {
-    "box": lambda collider: sorted(collider.size)[1],       # a wall is wide, a post is not
-    "sphere": lambda collider: 2 * collider.radius,
-    "cylinder": lambda collider: 2 * collider.radius,
-}
+        rigid = body.shape.rigid
+        if body.restitution > 0 and (several or (rigid and solid)):
+            path = ("effects",) if scene.bodies[index].restitution is None else ("bodies", index)
+            where = "planes and rooms" if rigid else "colliders"
+            yield (*path, "restitution"), (f"{body.name} rebounds from {where} alone: restitution between "
+                                           f"{'hulls' if rigid else 'bodies'} is not simulated yet")
+            return
 
 
 def resolution(scene: Scene, bodies: list[Body]) -> Warnings:
@@ -203,7 +187,7 @@ def lost_gravity(scene: Scene, bodies: list[Body]) -> Warnings:
     """Substeps so short that the displacement g h^2 of one is lost when it is added to a float32 coordinate."""
     if scene.solver.precision != "float32" or scene.effects.gravity is None:
         return
-    fall = float(np.linalg.norm(scene.effects.gravity)) * _step(scene)**2
+    fall = float(np.linalg.norm(scene.effects.gravity)) / substeps_a_second(scene)**2
     spacing = _float32_spacing(bodies)
     if 0 < fall < spacing:
         yield ("solver", "precision"), (f"gravity moves a particle by {fall:.2g} m a substep, less than float32 "
@@ -214,10 +198,6 @@ def _float32_spacing(bodies: list[Body]) -> float:
     """Distance (m) between neighbouring float32 numbers at the largest coordinate of the scene."""
     largest = max((float(np.abs(body.positions).max()) for body in bodies), default=0.0)
     return float(np.spacing(np.float32(largest)))
-
-
-def _step(scene: Scene) -> float:
-    return 1 / (scene.time.frame_rate * scene.solver.substeps)
 
 
 def _size(body: Body) -> float:

@@ -12,6 +12,7 @@ from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.shapes import edges
 
 TOUCH = 1e-6            # of the smaller body's size: overlap up to this is touching
+RECOVERY = 2.5          # 1/s: how fast whole bodies give an overlap back, in radii of the smaller one (effects/response.py)
 MOST_BODIES = 2000      # more bodies than this, and
 MOST_AXES = 50_000      # pairs with more candidate axes than this, are not compared
 CHUNK = 2_000_000       # pairs of points looked at together
@@ -35,7 +36,17 @@ def overlaps(scene: Scene, bodies: list[Body]) -> Iterator[tuple[Key, str]]:
         smaller = min((upper[index] - lower[index]).max() for index in (first, second))
         depth = overlap_depth(a, b)
         if depth > TOUCH * smaller:
-            yield ("bodies", once[second]), f"overlaps body {a.name} at the start, by {depth:.3g} m"
+            yield ("bodies", once[second]), (f"overlaps body {a.name} at the start, by {depth:.3g} m: "
+                                              f"{consequence(scene, a.shape.rigid, b.shape.rigid)}")
+
+
+def consequence(scene: Scene, *rigid: bool) -> str:
+    """What becomes of two bodies that overlap at the start."""
+    if not any(rigid):
+        return "the first step pushes them apart"
+    if scene.solver.response == "feature":
+        return "the first steps throw them apart"
+    return f"they part slowly, by {RECOVERY:g} times the radius of the smaller rigid one a second"
 
 
 def overlap_depth(a: Body, b: Body) -> float:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import COLUMNS, World
+from verlet_numba.buffers import COLUMNS, Effects, World
 from verlet_numba.scene.body import Shape
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.numbering import Group
@@ -13,12 +13,14 @@ from verlet_numba.scene.prepare import Prepared
 from verlet_numba.scene.schema import Scene
 
 INTERPRETER = 190 << 20     # bytes of Python, NumPy, Numba, HDF5 and the compiled kernels
+MEETING = 40 << 20          # and of SciPy and more kernels, where bodies meet each other
 BUILDING = 1.4              # times the buffers: the bodies, their numbering, and what the file says of them
 CHUNK_BYTES = 2 << 20       # of a chunk of frames on its way to the file, at most
 FRAME_MEASURES = COLUMNS * 8 + 10 * 8       # bytes of a frame's observables, time and step, and offsets for VTK
 FILE_GROUPS = 128 << 10     # bytes of a file's groups, attributes and empty datasets
 FILE_CHUNK, FILE_ROWS = 64 << 10, 512       # the file grows by chunks: bytes of a field (or a frame); rows of measures
 FILE_INDEX = 1.01           # what finding the chunks takes
+HULLED = ("box", "sphere", "cylinder")      # colliders that rigid bodies meet with their whole hull
 
 
 class Phase(NamedTuple):
@@ -40,8 +42,13 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
         "groups": [{"kind": group.shape.kind, "copies": group.copies, "particles_a_copy": len(group.slot),
                     "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
-        "memory_bytes": INTERPRETER + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
+        "memory_bytes": INTERPRETER + MEETING * bodies_meet(model.world) + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
         "file_bytes_at_most": file_bytes(prepared, model)}
+
+
+def bodies_meet(world: World) -> bool:
+    """Whether any two bodies may touch."""
+    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed))
 
 
 def frame_count(scene: Scene) -> int:
@@ -53,6 +60,8 @@ def lanes(model: Model, group: Group) -> str:
     """How the sticks of a group are relaxed."""
     if not len(group.shape.sticks):
         return "no sticks"
+    if model.world.graph is not None and group.shape.rigid:
+        return "outwards from what collided"
     first, last = group.first, group.first + group.size
     runs = model.world.runs
     mine = [] if runs is None else [int(n) for i, n in zip(runs.first[0], runs.lanes, strict=True) if first <= i < last]
@@ -65,7 +74,7 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     effects, active = scene.effects, world.effects
     faces = any(len(body.shape.triangles) for body in prepared.bodies)
     named, unnamed = "named in effects", "not named in effects"
-    moves = bool((world.particles.inverse_mass > 0).any())
+    moves = can_move(world)
     yield Phase("gravity", active.gravity is not None, named if effects.gravity else unnamed)
     yield Phase("wind", active.wind is not None,
                 unnamed if effects.wind is None else named if faces else "named, but no body has triangles")
@@ -76,42 +85,111 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
                 "a body has a path" if active.carried else "no body has a path")
     yield Phase("motion of colliders", active.moving is not None,
                 "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
-    yield Phase("contact with colliders", active.contact is not None, contact_reason(prepared, moves))
-    yield Phase("whole-body response", active.rigid is not None, "rigid bodies without pins meet colliders" if active.rigid
-                else "no rigid body without pins meets a collider")
-    for name in ("self-collision", "continuous collision", "bending", "orientation guard"):
+    yield from contacts(prepared, model)
+    for name in ("continuous collision", "bending", "orientation guard"):
         yield Phase(name, False, "not simulated yet")
-    yield Phase("contact between bodies", False, "not simulated yet: bodies pass through each other"
-                if sum(body.copies for body in prepared.bodies) > 1 else "there is one body at most")
-    yield Phase("restitution", active.restitution is not None, material_reason(active.contact, active.restitution, "restitution"))
-    yield Phase("rest", active.rest is not None, unnamed if effects.rest is None else named if active.rest is not None
-                else "named, but there is no rigid body that may rest on something")
-    yield Phase("runs of sticks", world.runs is not None,
-                "ropes, cloth or several bodies of one kind" if world.runs else "no rope, no cloth, no body in several copies")
-    yield Phase("single sticks", world.sticks is not None,
-                "bodies without copies, or attachments" if world.sticks else "no single body with sticks, no attachment")
-    soft = world.runs_softness is not None or world.sticks_softness is not None
-    yield Phase("compliance over passes", soft, "a body is compliant and there are several passes" if soft
-                else "no body is compliant, or one pass a substep, where it is part of the weights")
-    yield Phase("tolerance", world.solver.tolerance is not None,
-                "solver.tolerance is above 0" if world.solver.tolerance else "solver.tolerance is 0: every stick is relaxed")
-    yield Phase("angles", world.angles is not None, "a body keeps angles" if world.angles else "no body keeps angles")
-    yield Phase("friction", active.friction is not None, material_reason(active.contact, active.friction, "friction"))
+    yield Phase("rest", active.rest is not None, rest_reason(prepared, active))
+    yield from constraints(world)
     yield Phase("velocities", "velocity" in scene.output.fields, "named in output.fields" if scene.output.fields
                 else "not named in output.fields")
 
 
-def contact_reason(prepared: Prepared, moves: bool) -> str:
-    if not prepared.scene.colliders:
-        return "the scene has no collider"
+def contacts(prepared: Prepared, model: Model) -> Iterator[Phase]:
+    """Finding contacts and answering to them."""
+    world, solver, active = model.world, prepared.scene.solver, model.world.effects
+    none = no_contact(prepared, world)
+    colliders = bool(prepared.scene.colliders)
+    yield Phase("contact with colliders", active.contact is not None,
+                none or ("the scene has colliders" if colliders else "the scene has no collider"))
+    yield from rigid_contacts(prepared, model, none)
+    yield from soft_contacts(prepared, model, none)
+    rigid, features, hulls = active.rigid is not None, active.features is not None, active.meet or active.mixed
+    met = none or ("no rigid body" if not any(body.shape.rigid for body in prepared.bodies) else "rigid bodies meet nothing")
+    kept = f"solver.response is {solver.response}"
+    yield Phase("whole-body response", rigid, kept if rigid or solver.response == "feature" else met)
+    yield Phase("feature response", features, kept if features or solver.response == "body" else none or "no hulls meet")
+    touch = bool(active.contact or hulls or active.spheres)
+    yield Phase("restitution", active.contact is not None and active.restitution is not None,
+                "no collider is met, and only colliders give speed back" if active.contact is None
+                else material_reason(active.restitution, "restitution"))
+    yield Phase("friction", active.friction is not None,
+                material_reason(active.friction, "friction") if touch else "nothing touches")
+
+
+def rigid_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phase]:
+    """Convex hulls that meet. none: why nothing meets at all, empty if something may."""
+    scene, meet, mixed = prepared.scene, model.world.effects.meet, model.world.effects.mixed
+    bodies = sum((len(body.shape.parts) or 1) * body.copies for body in prepared.bodies if body.shape.rigid)
+    solid = sum(collider.kind in HULLED for collider in scene.colliders)
+    absent = none or ("no rigid body" if not bodies else "all hulls are still" if bodies + solid > 1
+                      else "no two hulls: one rigid body, and no box, sphere or cylinder")
+    told = f"{bodies} hulls of rigid bodies, {solid} of colliders"
+    grids = "all pairs: solver.broad_phase" if scene.solver.broad_phase == "all_pairs" else "grids: solver.broad_phase is sweep"
+    yield Phase("pair search", meet is not None, f"{told}; {grids}" if meet else absent)
+    yield Phase("narrow phase", bool(meet or mixed), "hulls meet" if meet else "particles meet hulls" if mixed else absent)
+    several = meet is not None and meet.manifold is not None
+    yield Phase("contact manifolds", several, "solver.response is body: hulls rest on edges and faces" if several
+                else "solver.response is feature: one contact a pair" if meet else absent)
+
+
+def soft_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phase]:
+    """Deformable bodies that meet. none: as above."""
+    scene, trees, spheres, mixed = (prepared.scene, model.world.effects.trees, model.world.effects.spheres,
+                                    model.world.effects.mixed)
+    soft = [body for body in prepared.bodies if not body.shape.rigid]
+    count, rigid = sum(body.copies for body in soft), sum(body.copies for body in prepared.bodies if body.shape.rigid)
+    absent = none or ("" if soft else "no deformable body")
+    thin = "" if any(body.shape.radius > 0 for body in soft) else "no deformable body has a thickness"
+    particles = sum(body.copies * len(body.pinned) for body in soft)
+    asked = scene.effects.self_collision
+    single = "" if particles > 1 else "one particle"
+    yield Phase("sphere trees", trees is not None, f"over {particles} particles" if trees
+                else absent or "deformable bodies meet neither each other nor rigid ones")
+    yield Phase("deformable contact", spheres is not None and count > 1, f"{count} bodies, as spheres about particles"
+                if spheres and count > 1 else absent or ("one deformable body" if count < 2 else thin))
+    yield Phase("self-contact", spheres is not None and asked, "effects.self_collision" if spheres and asked
+                else absent or (thin or single if asked else "effects.self_collision is off"))
+    yield Phase("deformable against rigid", mixed is not None, f"{particles} particles, {rigid} rigid bodies" if mixed
+                else absent or "no rigid body")
+
+
+def constraints(world: World) -> Iterator[Phase]:
+    """Relaxation."""
+    solver, ordered = world.solver, " outside of the constraint graph" if world.graph else ""
+    yield Phase("constraint graph", world.graph is not None, "solver.order is constraint_graph" if world.graph
+                else "solver.order is sequential, or there is no rigid body")
+    yield Phase("runs of sticks", world.runs is not None, "ropes, cloth or several bodies of one kind" if world.runs
+                else f"no rope, no cloth, no body in several copies{ordered}")
+    yield Phase("single sticks", world.sticks is not None, "bodies without copies, or attachments" if world.sticks
+                else f"no single body with sticks{ordered}, no attachment")
+    soft = world.runs_softness is not None or world.sticks_softness is not None
+    yield Phase("compliance over passes", soft, "a body is compliant and there are several passes" if soft
+                else "no body is compliant, or one pass a substep, where it is part of the weights")
+    yield Phase("tolerance", solver.tolerance is not None,
+                "solver.tolerance is above 0" if solver.tolerance else "solver.tolerance is 0: every stick is relaxed")
+    yield Phase("angles", world.angles is not None, "a body keeps angles" if world.angles else "no body keeps angles")
+
+
+def can_move(world: World) -> bool:
+    return bool((world.particles.inverse_mass > 0).any())
+
+
+def no_contact(prepared: Prepared, world: World) -> str:
+    """Why nothing in the scene can touch; empty if something may."""
     if prepared.scene.effects.contact == "none":
         return "effects.contact is none"
-    return "the scene has colliders" if moves else "nothing can move"
+    return "" if can_move(world) else "nothing can move"
 
 
-def material_reason(contact: object, effect: object, name: str) -> str:
-    if contact is None:
-        return "nothing touches"
+def rest_reason(prepared: Prepared, active: Effects) -> str:
+    if prepared.scene.effects.rest is None:
+        return "effects.rest is left out"
+    if active.mixed is not None:
+        return "named, but deformable bodies meet the rigid ones and keep them awake"
+    return "effects.rest" if active.rest is not None else "named, but there is no rigid body that may rest on something"
+
+
+def material_reason(effect: object, name: str) -> str:
     return f"materials that meet have {name}" if effect is not None else f"no materials that meet have {name}"
 
 

@@ -56,11 +56,14 @@ class Solver(Part):
         default="by_level", description="how often `constraint_graph` solves a stick, by its distance from the moved "
                                         "particle: n/k rounded up, halved each level, or once")
     response: Literal["body", "feature"] = Field(
-        default="body", description="contacts of rigid bodies move whole bodies, or only the features that touch")
+        default="body", description="contacts of rigid bodies move whole bodies, with as many contacts "
+                                    "as edges and faces need; or only the features that touch, one contact a pair")
     projection_point: Literal["feature", "body", "printed"] = Field(
-        default="feature", description="the point onto which `response: feature` projects")
+        default="feature", description="where two features meet: by their own masses, by those of the "
+                                       "bodies, or by those the wrong way round, as eq. 10 of the paper is printed")
     deformable_contact: Literal["exact", "spheres"] = Field(
-        default="spheres", description="contacts of cloth and ropes: vertex-triangle and edge-edge, or spheres")
+        default="spheres", description="contacts of cloth and ropes: vertex-triangle and edge-edge, or spheres "
+                                       "about the particles")
     orientation_guard: Switch = Field(
         default=False, description="whether rigid bodies that were turned inside out are restored")
     gradient: Literal["current", "step_start"] = Field(
@@ -70,7 +73,8 @@ class Solver(Part):
         default="exact", description="`approximate`: one Newton step from the rest length (Jakobsen 2001)")
     precision: Literal["float64", "float32"] = Field(default="float64", description="of the simulation")
     broad_phase: Literal["sweep", "all_pairs"] = Field(
-        default="sweep", description="how pairs that may touch are found")
+        default="sweep", description="how pairs of rigid bodies that may touch are found: `sweep` through a "
+                                      "hierarchy of grids")
 
     @model_validator(mode="before")
     @classmethod

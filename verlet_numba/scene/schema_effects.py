@@ -55,8 +55,10 @@ class Effects(Part):
                                   "none")
     restitution: Fraction | None = Field(
         default=None, description="part of the normal speed that an impact gives back, of all bodies and colliders "
-                                  "that set none; two materials meet with the larger one")
-    self_collision: Switch = Field(default=False, description="whether particles of one body meet each other")
+                                  "that set none; two materials meet with the larger one. Rigid bodies rebound "
+                                  "from planes and rooms, particles from all colliders")
+    self_collision: Switch = Field(
+        default=False, description="whether cloth, ropes and bodies of particles meet themselves, as spheres of their thickness")
     continuous_collision: Switch = Field(default=False, description="whether contacts are sought along the whole step")
     bending: Bending | None = Field(default=None, description="resistance to bending")
     rest: Rest | None = Field(default=None, description="when bodies are put to rest")

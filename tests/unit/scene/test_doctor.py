@@ -97,14 +97,131 @@ bodies:
     assert paths(text + "attachments: [[a, 10, b, 0]]", "overlaps") == []
 
 
+@pytest.mark.parametrize(("response", "pair", "then"), [
+    ("body", PAIR % ("box", 1.1, "size: [1, 1, 1]"), "they part slowly, by 2.5 times the radius"),
+    ("feature", PAIR % ("box", 1.1, "size: [1, 1, 1]"), "the first steps throw them apart"),
+    ("body", PAIR % ("cloth", 1.1, "size: [1, 1], resolution: [3, 3]"), "they part slowly"),
+])
+def test_what_becomes_of_an_overlap(response, pair, then):
+    assert paths(f"solver: {{response: {response}}}{pair}", then) == ["bodies.1"]
+
+
+def test_deformable_bodies_that_overlap_part_at_once():
+    text = """
+bodies:
+  - {kind: rope, name: a, mass: 1, start: [0, 0, 0], end: [1, 0, 0], segments: 10, thickness: 0.2}
+  - {kind: rope, name: b, mass: 1, start: [0.5, 0, 0.1], end: [0.5, 0, 1], segments: 10, thickness: 0.2}
+"""
+    assert paths(text, "the first step pushes them apart") == ["bodies.1"]
+
+
 def test_too_fast_for_a_thin_collider():
-    """At 480 substeps a second a wall of 0.1 m is passed within one from 48 m/s on."""
+    """A hull leaves by the shortest way. An icosahedron of radius 0.1 m is 0.15893 m wide across its faces: half of that and
+    of a wall of 0.1 m is 0.12947 m, at 480 substeps a second 62.14 m/s. A point leaves by the way it came: 48 m/s."""
     text = """
 bodies: [{kind: icosahedron, radius: 0.1, mass: 1, position: [0, 0, 2], velocity: [%s, 0, 0]}]
 colliders: [{kind: box, size: [0.1, 5, 5], position: [3, 0, 0]}]
 """
-    assert paths(text % 47, "may pass through") == []
-    assert paths(text % 49, "use 9 substeps") == ["bodies.0"]
+    assert paths(text % 62.1, "may pass through") == []
+    assert paths(text % 62.2, "from collider box_0, and is held back from 0.129 m at most") == ["bodies.0"]
+    assert paths(text % 62.2, "use 9 substeps") == ["bodies.0"]
+    point = text.replace("icosahedron, radius: 0.1, mass: 1", "particles, positions: [[0, 0, 0]], masses: [1]")
+    assert paths(point % 47, "may pass through") == []
+    assert paths(point % 49, "use 9 substeps") == ["bodies.0"]
+
+
+def test_too_fast_for_another_body():
+    """Boxes of 0.2 and 0.1 m pass each other from 0.15 m a substep on, 72 m/s between them; the faster one is to blame."""
+    text = """
+bodies:
+  - {kind: box, name: a, size: [1, 0.2, 1], mass: 1, position: [0, 0, 0], velocity: [0, %s, 0]}
+  - {kind: box, name: b, size: [1, 1, 0.1], mass: 1, position: [0, 9, 0], velocity: [0, %s, 0], fixed: %s}
+"""
+    assert paths(text % (40, -31.9, "false"), "may pass through") == []
+    assert paths(text % (40, -32.1, "false"), "seen from body b, and is held back from 0.15 m") == ["bodies.0"]
+    assert paths(text % (30, -42.1, "false"), "seen from body a") == ["bodies.1"]
+    assert paths(text % (72.1, 0, "true"), "use 9 substeps") == ["bodies.0"]
+    assert paths(text % (72.1, 0, "true") + "effects: {contact: none}", "") == []
+
+
+def test_copies_too_fast_for_each_other():
+    text = ("bodies: [{kind: box, size: [0.1, 0.1, 0.1], mass: 1, count: %s, "
+            "scatter: {inside: [[0, 0, 0], [9, 9, 9]], speed: [%s, %s]}}]")
+    assert paths(text % (2, 24.1, 24.1), "seen from another copy") == ["bodies.0"]
+    assert paths(text % (2, 23.9, 23.9), "seen from another copy") == []
+    assert paths(text % (1, 24.1, 24.1), "seen from another copy") == []
+
+
+def test_points_pass_each_other_at_any_speed():
+    """They never meet, and so cannot be too fast; a rigid body they do meet."""
+    points = "bodies: [{kind: particles, positions: [[0, 0, 0], [1, 0, 0]], masses: [1, 1], velocity: [99, 0, 0]}, %s]"
+    assert paths(points % "{kind: rope, mass: 1, start: [0, 0, 1], end: [1, 0, 1], segments: 2}", "may pass") == []
+    assert paths(points % "{kind: box, size: [0.2, 1, 1], mass: 1, position: [9, 0, 0]}", "seen from body box_1") == ["bodies.0"]
+
+
+ROPES = """
+effects: {self_collision: %s}
+bodies:
+  - {kind: rope, name: a, mass: 1, start: [0, 0, 0], end: [0, 0, 3], segments: 10, thickness: %s}
+  - {kind: rope, name: b, mass: 1, start: [1, 0, 0], end: [1, 0, 4], segments: 10, thickness: %s}
+"""
+
+
+def test_ropes_that_slip_between_each_others_beads():
+    """Segments of 0.3 and 0.4 m that cross at their middles have ends 0.25 m apart: so much have both radii to be."""
+    assert paths(ROPES % ("false", 0.3, 0.2), "may slip") == []
+    assert paths(ROPES % ("false", 0.3, 0.199), "thicknesses of 0.5 m together are enough, they are 0.499 m") == ["bodies.1"]
+    assert paths(ROPES % ("false", 0.3, 0.199), "through body a") == ["bodies.1"]
+
+
+def test_a_rope_that_slips_through_itself():
+    """Segments of one length l that cross have ends l / sqrt(2) apart."""
+    alone = ROPES[:ROPES.index("  - {kind: rope, name: b")]
+    assert paths(alone % ("true", 0.2122), "may slip") == []
+    assert paths(alone % ("true", 0.212), "through itself") == ["bodies.0"]
+    assert paths(alone % ("true", 0.212), "a thickness of 0.212 m is enough") == ["bodies.0"]
+    assert paths(alone % ("false", 0.212), "may slip") == []
+
+
+def test_a_thin_rope_slips_through_the_cells_of_a_cloth():
+    """Half the diagonal of a cell of 0.3 x 0.4 m is 0.25 m. A cloth holds another one like it from 0.2828 m of thickness on."""
+    text = """
+bodies:
+  - {kind: cloth, name: sheet, size: [3, 4], resolution: [11, 11], mass: 1, thickness: 0.4, position: [5, 0, 1]}
+  - {kind: rope, name: line, mass: 1, start: [0, 0, 0], end: [1, 0, 0], segments: 100, thickness: %s}
+"""
+    sheets = text[:text.index("  - {kind: rope")].replace("0.4, position", "%s, position")
+    assert paths(text % 0.11, "may slip") == []
+    assert paths(text % 0.099, "through body sheet") == ["bodies.1"]
+    assert paths("effects: {self_collision: true}" + sheets % 0.283, "may slip") == []
+    assert paths("effects: {self_collision: true}" + sheets % 0.282, "through itself") == ["bodies.0"]
+
+
+def test_what_cannot_meet_itself():
+    rope = "bodies: [{kind: rope, mass: 1, start: [0, 0, 0], end: [1, 0, 0], segments: 4, thickness: %s}]\n"
+    asked = "effects: {self_collision: true}\n"
+    assert paths(rope % 0 + asked, "has no thickness, so `self_collision` does nothing") == ["bodies.0"]
+    assert paths(rope % 0.3 + asked, "") == []
+    assert paths(rope % 0, "") == []
+    box = "bodies: [{kind: box, size: [1, 1, 1], mass: 1}]\n"
+    assert paths(box + asked, "does nothing: there is no cloth") == ["effects.self_collision"]
+
+
+def test_restitution_that_has_no_effect():
+    text = """
+effects: {restitution: %s}
+bodies: [{kind: %s, mass: 1, position: [0, 0, 3]}]
+colliders: [{kind: plane}, {kind: room, size: [9, 9, 9]}%s]
+"""
+    box, cloth = "box, size: [1, 1, 1]", "cloth, size: [1, 1], resolution: [9, 9]"
+    post = ", {kind: box, size: [1, 1, 1], position: [3, 3, 3]}"
+    assert paths(text % (0.5, box, ""), "rebounds") == []
+    assert paths(text % (0.5, box, post), "box_0 rebounds from planes and rooms alone") == ["effects.restitution"]
+    assert paths(text % (0, box, post), "rebounds") == []
+    assert paths(text % (0.5, cloth, post), "rebounds") == []
+    other = ", restitution: 1}, {kind: box, size: [1, 1, 1], mass: 1, position: [2, 2, 2]}]\ncoll"
+    two = (text % (0, box, "")).replace("}]\ncoll", other)
+    assert paths(two, "rebounds from planes and rooms alone") == ["bodies.0.restitution"]
 
 
 def test_sticks_that_are_repeated_stretched_pointlike_or_uneven():
@@ -130,18 +247,27 @@ bodies:
   - {kind: box, name: b, size: [1, 1, 1], mass: 1, position: [1, 0, 0], pinned: %s}
 attachments: [[a, 4, b, %s]]
 """
-    assert paths(text % (1, "false", [], 0), "") == ["bodies"]
+    assert paths(text % (1, "false", [], 0), "") == []
     assert paths(text % (1, "false", [], 1), "start 1 m apart") == ["attachments.0"]
     assert paths(text % (1, "true", [0], 0), "both particles are pinned") == ["attachments.0"]
     assert paths(text % (101, "false", [], 0), "masses of 101:1") == ["attachments.0"]
     assert paths(text % (101, "true", [], 0), "masses of") == []
 
 
-def test_bodies_pass_through_each_other():
-    one = "bodies: [{kind: icosahedron, radius: 0.1, mass: 1, count: %s, scatter: {inside: [[0, 0, 0], [2, 2, 2]]}}]\n"
-    assert paths(one % 2, "not simulated yet") == ["bodies"]
-    assert paths(one % 1, "not simulated yet") == []
-    assert paths(one % 2 + "effects: {contact: none}", "not simulated yet") == []
+def test_attachments_that_contact_works_against():
+    text = """
+bodies:
+  - {kind: rope, name: line, start: [0, 0, 0], end: [1, 0, 0], segments: 2, mass: 1, thickness: %s}
+  - {kind: %s, mass: 1, position: [1.5, 0.5, 0.5]}
+attachments: [[line, 2, %s, 0]]
+"""
+    box, cloth = ("box, size: [1, 1, 1]", "box_1"), ("cloth, size: [1, 1], resolution: [2, 2], thickness: 0.2", "cloth_1")
+    assert paths(text % (0.1, *box), "pushes the attached particle away") == ["attachments.0"]
+    assert paths(text % (0, *box), "pushes") == []
+    raised = text.replace("0.5, 0.5]", "0.5, 0]")
+    assert paths(raised % (0.79, *cloth), "pushes") == []
+    assert paths(raised % (0.81, *cloth), "the sphere of cloth_1 pushes the neighbours") == ["attachments.0"]
+    assert paths(raised % (0.81, *cloth) + "effects: {contact: none}", "pushes") == []
 
 
 def test_float32_far_from_the_origin():
@@ -197,10 +323,14 @@ def test_bracing_is_told(tmp_path, monkeypatch):
     assert paths("bodies: [{kind: mesh, file: ball.obj, mass: 1}]", "braced by 3 sticks", tmp_path) == ["bodies.0.file"]
 
 
-def test_colliders_that_slip_between_particles():
-    text = """
-bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [0, 0, 2]}]
-colliders: [{kind: %s, radius: %s}]
-"""
-    assert paths(text % ("sphere", 0.3), "may slip between") == ["bodies.0"]
-    assert paths(text % ("sphere", 0.8), "may slip between") == []
+SLIPPING = "\ncolliders: [{kind: sphere, name: ball, radius: %s}]"
+
+
+def test_what_slips_between_the_particles_of_a_cloth():
+    """A cell of 0.5 m has a diagonal of 0.7071 m. Rigid bodies are not coarse: they meet others with their whole hull."""
+    cloth = "bodies: [{kind: cloth, size: [1, 1], resolution: [3, 3], thickness: 0.1, mass: 1, position: [0, 0, 2]}%s]"
+    assert paths(cloth % "" + SLIPPING % 0.30, "collider ball is 0.6 m wide: it may slip between") == ["bodies.0"]
+    assert paths(cloth % "" + SLIPPING % 0.31, "may slip between") == []
+    assert paths(cloth % ", {kind: box, name: bar, size: [0.6, 9, 0.1], mass: 1}", "body bar is 0.6 m wide") == ["bodies.0"]
+    assert paths(cloth % ", {kind: box, name: bar, size: [0.61, 9, 0.1], mass: 1}", "may slip between") == []
+    assert paths("bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [0, 0, 2]}]" + SLIPPING % 0.3, "may slip") == []
