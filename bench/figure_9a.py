@@ -83,17 +83,23 @@ def depths(count: int, seconds: float, substeps: range, barred: bool) -> Iterato
         yield from sound(case, bodies, side)
 
 
-def at_rest(count: int, settle: float, watch: float, barred: bool) -> Iterator[Figure]:
-    """What still moves after a while, in which no icosahedron should, and how far it gets in another."""
-    model = started(e1(count))
+def at_rest(count: int, settle: float, watch: float, barred: bool, rest: bool) -> Iterator[Figure]:
+    """What still moves after a while, in which no icosahedron should, and how far it gets in another.
+
+    rest: bodies are put to rest (`effects.rest`); else contacts alone must hold them.
+    """
+    scene = e1(count)
+    if rest:
+        scene["effects"]["rest"] = {}
+    model = started(scene)
     before = bodies_of(model, advanced(model, round(settle * RATE))[0][-1])
     after = bodies_of(model, advanced(model, round(watch * RATE))[0])
     trail = np.concatenate([before[None], after])
     speeds = np.linalg.norm(np.diff(trail, axis=0), axis=-1).max(axis=(1, 2)) * RATE
     drift = np.linalg.norm(trail - before, axis=-1).max()
     upright = count - max(mirrored(each, model.bodies[0].shape.triangles) for each in (before, trail[-1]))
-    case = f"{count:,} icosahedra at rest"
-    yield figure(STUDY, case, f"fastest particle after {settle:g} s", "m/s", speeds, at_most=0.01 if barred else None)
+    case = f"{count:,} icosahedra at rest" + (", put to rest" if rest else "")
+    yield figure(STUDY, case, f"fastest particle after {settle:g} s", "m/s", speeds.max(), at_most=0.01 if barred else None)
     yield figure(STUDY, case, f"farthest in the next {watch:g} s", "m", drift, at_most=1e-3 if barred else None)
     yield figure(STUDY, case, "bodies not mirrored", "1", upright, at_least=count)
     yield from sound(case, trail[[0, -1]], room_of(model))
@@ -123,13 +129,14 @@ def studies(curves: Curves) -> Iterator[Figure]:
     yield from frame_rates(COUNTS + LARGE, 5.0, 3, curves)
     yield from growth(curves, *LARGE)
     yield from depths(1000, 5.0, range(2, 9), True)
-    yield from at_rest(200, 15.0, 5.0, True)
+    yield from at_rest(200, 15.0, 5.0, False, rest=False)
+    yield from at_rest(200, 15.0, 5.0, True, rest=True)
 
 
 def short_studies(curves: Curves) -> Iterator[Figure]:
     yield from frame_rates(QUICK, 1.0, 1, curves)
     yield from depths(20, 1.0, range(4, 9, 4), False)
-    yield from at_rest(5, 3.0, 1.0, False)
+    yield from at_rest(5, 3.0, 1.0, False, rest=True)
 
 
 @click.command()
