@@ -1,5 +1,7 @@
 """Which bodies are put to rest and which are woken, against plain loops over sets."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import worlds
@@ -60,7 +62,7 @@ class Scene:
 
     def rests(self, *islands):
         """Put islands to rest that hang together in chains, the first body of each on the plane."""
-        chains = [(a, b) for island in islands for a, b in zip(island, island[1:], strict=False)]
+        chains = [(a, b) for island in islands for a, b in pairwise(island)]
         self.rest.slow[:] = 0
         self.rest.slow[[b for island in islands for b in island]] = WAIT
         self.meets(chains, np.ones(len(chains)))
