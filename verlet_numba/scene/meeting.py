@@ -79,8 +79,9 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
         return Contact()
     rigid = touches = features = None
     if as_whole and (contact is not None or meets):
-        rigid = rigid_of(bodies, numbering, size, FIRST_ROOM)
-        touches = touches_of(FIRST_ROOM, len(rigid.size))
+        most = FIRST_ROOM * sum(each is not None for each in (contact, meet, mixed))       # all that may touch at once
+        rigid = rigid_of(bodies, numbering, size, most)
+        touches = touches_of(most, len(rigid.size))
     if scene.solver.response == "feature" and meets:
         features = Features(POINTS[scene.solver.projection_point], body_masses(bodies, numbering, inverse_mass, hulls),
                             body_masses(bodies, numbering, inverse_mass, points))
