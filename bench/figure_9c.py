@@ -12,7 +12,7 @@ Writes figure_9c.csv and figure_9c.png. What holds (throws of 3 s by 1 to 50 ico
 - no reading has constraint-graph order relax half as much. With the paper's repeats it relaxes 0.99 to 1.1 times what
   sequential order does, and visits 1.6 to 2.0 times as many constraints; each stick once in order of distance, 0.93 to 0.94
   times, and as many visits;
-- relaxations are a tenth of the paper's 750 a body and step: 50 to 100. Visits come near it. Those of ten passes are, for 25
+- relaxations are a tenth of the paper's 750 a body and step: 45 to 105. Visits come near it. Those of ten passes are, for 25
   and 50 icosahedra, 9,000 and 18,000 in sequential order and 17,700 and 35,300 in graph order: near to the paper's two
   curves (9,500 and 22,500; 19,000 and 37,500), with the orders the other way round.
 
@@ -90,9 +90,10 @@ def fall_and_meet(model: Model) -> World:
     integrate(position, previous, acceleration, model.world.solver.step)
     gather(position, model.world.effects.hulls)
     while not (find_contacts(position, previous, inverse_mass, model.world.effects.contact)
-               and find_meetings(model.world.effects.hulls, model.world.effects.meet)):
+               and find_meetings(model.world.effects.hulls, model.world.effects.meet, None)):
         model.world = grown(model.world)
-    begin_features(model.world.effects.meet, model.world.effects.features)
+    effects = model.world.effects
+    begin_features(inverse_mass, effects.meet, effects.hulls, effects.features)
     remember(position, model.world.collided)
     return model.world
 
