@@ -13,7 +13,8 @@ PAPER = {"preset": "paper"}
 POINTS = ("feature", "body", "printed")
 DIE = {"kind": "icosahedron", "name": "die", "radius": 0.2, "position": [0.02, 0.03, 0.31],
        "rotation": {"axis": [1, 2, 3], "degrees": 35}, "velocity": [1, 2, -3]}
-CRATE = {"kind": "box", "name": "crate", "size": [0.4, 0.5, 0.3], "position": [0, 0, 0], "rotation": {"axis": [0, 1, 2], "degrees": 10}}
+CRATE = {"kind": "box", "name": "crate", "size": [0.4, 0.5, 0.3], "position": [0, 0, 0],
+         "rotation": {"axis": [0, 1, 2], "degrees": 10}}
 
 
 class Case:
