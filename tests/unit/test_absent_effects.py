@@ -77,7 +77,7 @@ def test_frame_loop_holds_only_what_is_called_for(name):
 
 
 def test_every_effect_leaves_a_trace():
-    """Else the tests above would not look at it. Trees come with the spheres or hulls they are for; gravity has no function."""
+    """Else the tests above would not look at it. Trees come with what they are for; gravity has no function."""
     assert {effect for effects in OCCURS.values() for effect in effects} >= EFFECTS - {"gravity", "trees"}
 
 

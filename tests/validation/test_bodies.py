@@ -195,10 +195,9 @@ def test_angular_momentum_is_kept_to_first_order(simulate, substeps):
 def pair(row):
     """A die and a box that collide, apart from all others."""
     rng = np.random.default_rng(row)
-    at = np.array([0, 4.0 * row, 1])
-    return [die(f"a{row}", list(at), velocity=[2, 0, 0.3], angular_velocity=list(rng.normal(size=3) * 4)),
-            box(f"b{row}", list(at + np.array([0.7, 0.1, 0.05])), velocity=[-2, 0.2, 0.3],
-                angular_velocity=list(rng.normal(size=3) * 4))]
+    x, y, z = 0.0, 4.0 * row, 1.0
+    return [die(f"a{row}", [x, y, z], velocity=[2, 0, 0.3], angular_velocity=list(rng.normal(size=3) * 4)),
+            box(f"b{row}", [x + 0.7, y + 0.1, z + 0.05], velocity=[-2, 0.2, 0.3], angular_velocity=list(rng.normal(size=3) * 4))]
 
 
 def test_a_pair_among_many_has_the_bits_of_the_pair_alone(simulate):

@@ -16,7 +16,7 @@ from verlet_numba.kernels.islands import sort_islands
 from verlet_numba.physics.pose import inward, outward, rotation
 from verlet_numba.physics.rigid import across, cross, response, times_symmetric
 
-SWEEPS = 16                 # over an island, at most
+SWEEPS = 48                 # over an island, at most
 FEW_SWEEPS = 4              # over an island of more touches than
 FEW_TOUCHES = 128           # these: what they leave, the next substep takes up
 SETTLED = 1e-7              # of the largest impulse: a sweep that changes less is the last
