@@ -42,8 +42,7 @@ SAMPLES = {     # an override for everything that this version may not do yet
     "solver.deformable_contact": "solver.deformable_contact=spheres", "solver.broad_phase": "solver.broad_phase=all_pairs",
     "solver.orientation_guard": "solver.orientation_guard=false", "effects.self_collision": "effects.self_collision=true",
     "effects.continuous_collision": "effects.continuous_collision=true", "effects.bending": "effects.bending={stiffness: 0.5}",
-    "effects.rest": "effects.rest={}", "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments",
-    "colliders.*.kind": "colliders=[{kind: mesh, file: bowl.stl}]"}
+    "effects.rest": "effects.rest={}", "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments"}
 
 
 def readable(path):

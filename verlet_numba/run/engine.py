@@ -123,9 +123,12 @@ class State:
     def moving(world: World) -> tuple[Array, ...]:
         """The arrays of a world that a substep leaves changed for the next."""
         solids: tuple[Array, ...] = ()
-        if world.effects.moving is not None and world.effects.contact is not None:
-            placed = world.effects.contact.solids
+        contact = world.effects.contact
+        if world.effects.moving is not None and contact is not None:
+            placed = contact.solids
             solids = (placed.origin, placed.rotation, placed.origin_before, placed.rotation_before)
+        if world.effects.meshes is not None:
+            solids += (world.effects.meshes.side,)
         return (world.particles.position, world.particles.previous, world.clock, world.snapshot.counts, *solids)
 
     @classmethod

@@ -30,7 +30,7 @@ def hulls_of_scene(bodies: list[Body], numbering: Numbering, solids: list[Solid]
     pieces = [*bodies_pieces(bodies, numbering)]
     if not pieces:
         return None
-    pieces += [piece for s, solid in enumerate(solids) for piece in collider_piece(s, solid)]
+    pieces += [piece for s, solid in enumerate(solids) for piece in collider_pieces(s, solid)]
     return laid_out(pieces)
 
 
@@ -44,21 +44,25 @@ def bodies_pieces(bodies: list[Body], numbering: Numbering) -> Any:
         first += len(index)
 
 
-def collider_piece(s: int, solid: Solid) -> list[Piece]:
-    """The hull of a collider, if it has one: planes are met by vertices."""
+def collider_pieces(s: int, solid: Solid) -> list[Piece]:
+    """The hulls of a collider: every triangle of a mesh, none of a plane, which vertices meet."""
     x, y, z, _ = solid.extent
+    rounding = 0.0
     if solid.kind == BOX:
-        local, rounding = np.array([[a, b, c] for a in (-x, x) for b in (-y, y) for c in (-z, z)]), 0.0
+        hulls = [np.array([[a, b, c] for a in (-x, x) for b in (-y, y) for c in (-z, z)])]
     elif solid.kind == SPHERE:
-        local, rounding = np.zeros((1, 3)), x
+        hulls, rounding = [np.zeros((1, 3))], x
     elif solid.kind == CYLINDER:
         turn = 2 * np.pi * np.arange(CYLINDER_SIDES) / CYLINDER_SIDES
         rim = np.stack([x * np.cos(turn), x * np.sin(turn), np.full(CYLINDER_SIDES, y)], axis=1)
-        local, rounding = np.concatenate([rim, rim * [1, 1, -1]]), 0.0
+        hulls = [np.concatenate([rim, rim * [1, 1, -1]])]
+    elif solid.surface is not None:
+        vertices, triangles = solid.surface
+        hulls = [*vertices[triangles]]
     else:
-        return []
-    corner = solid.origin[:, None] + solid.rotation @ local.T
-    return [Piece(-1, s, np.full(len(local), -1), corner, local.T, rounding)]
+        hulls = []
+    return [Piece(-1, s, np.full(len(local), -1), solid.origin[:, None] + solid.rotation @ local.T, local.T, rounding)
+            for local in hulls]
 
 
 def laid_out(pieces: list[Piece]) -> Hulls:

@@ -1,5 +1,6 @@
 """What meets what in a scene, and the buffers for it."""
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from verlet_numba.buffers import (
     Manifold,
     Meet,
     Meetings,
+    Meshes,
     Mixed,
     Moving,
     Narrow,
@@ -35,6 +37,7 @@ from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, ro
 from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
+from verlet_numba.scene.mesh_collider import meshes_of, ridges_of
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of, with_room
 from verlet_numba.scene.schema import Scene
@@ -51,6 +54,7 @@ POINTS_A_PAIR = 64          # of a manifold in the making
 class Contact(NamedTuple):
     moving: Moving | None = None
     contact: Contacts | None = None
+    meshes: Meshes | None = None
     hulls: Hulls | None = None
     meet: Meet | None = None
     trees: Trees | None = None
@@ -64,7 +68,7 @@ class Contact(NamedTuple):
     restitution: Restitution | None = None
 
 
-def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
+def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
                real: Any) -> Contact:
     """Contact of bodies with colliders and each other, and the materials that meet; None for what cannot happen.
 
@@ -72,10 +76,10 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     """
     if scene.effects.contact == "none" or not (inverse_mass > 0).any():
         return Contact()
-    size, (found, _) = len(inverse_mass), solids_of(scene)
+    size, (found, placed) = len(inverse_mass), solids_of(scene, folder)
     belongs = belongs_to(bodies, numbering, size)
     as_whole = scene.solver.response == "body" and bool((belongs >= 0).any())
-    contact = contacts(scene, bodies, numbering, size, belongs, as_whole, real)
+    contact = contacts(placed, bodies, numbering, size, belongs, as_whole, real)
     hulls, meet = hulls_meeting(scene, bodies, numbering, found, belongs, inverse_mass)
     trees, spheres, points, mixed = soft_meeting(scene, bodies, numbering, together, inverse_mass, real)
     meets = meet is not None or mixed is not None
@@ -88,8 +92,8 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     if scene.solver.response == "feature" and meets:
         features = Features(POINTS[scene.solver.projection_point], body_masses(bodies, numbering, inverse_mass, hulls),
                             body_masses(bodies, numbering, inverse_mass, points))
-    return Contact(moving(found) if contact is not None else None, contact, hulls, meet, trees, spheres, points, mixed,
-                   rigid, touches, features,
+    return Contact(moving(found) if contact is not None else None, contact, meshes_of(found, size), hulls, meet, trees, spheres,
+                   points, mixed, rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
                    restitution_of(scene, found, bodies, numbering, size, hulls, FIRST_ROOM, real))
 
@@ -103,7 +107,7 @@ def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found:
     still = still_hulls(hulls, belongs, inverse_mass)
     if still.all():
         return None, None
-    return hulls, meet_of(scene, hulls, still)
+    return hulls, meet_of(scene, found, hulls, still)
 
 
 def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -168,14 +172,14 @@ def still_hulls(hulls: Hulls, belongs: Integers, inverse_mass: Floats) -> Array:
     return ~moves[hulls.body]           # the last is what number -1, a collider, finds
 
 
-def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
+def meet_of(scene: Scene, found: list[Solid], hulls: Hulls, still: Array) -> Meet:
     """How the hulls of a scene meet."""
     reach = hulls.reach[hulls.body >= 0]
     several = scene.solver.response == "body"
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
                 narrow_of(hulls), manifold_of(int(hulls.size.max()), FIRST_ROOM) if several else None, meetings_of(FIRST_ROOM),
                 MEETING_MARGIN * float(reach.min()) if several else 0.0, scene.solver.substeps, 1,
-                1 if scene.solver.broad_phase == "all_pairs" else None)
+                1 if scene.solver.broad_phase == "all_pairs" else None, ridges_of(found, hulls))
 
 
 def whole(*shape: int) -> Array:
@@ -198,8 +202,9 @@ def meetings_of(room: int) -> Meetings:
 
 def search_of(hulls: int, room: int) -> Search:
     """The search for pairs among so many hulls, with room for so many pairs; no list has been made."""
-    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls), real_(GRIDS),
-                  whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4), whole(2 * hulls), whole(room))
+    return Search(whole(1), real_(3, hulls), real_(hulls), real_(2, 3, hulls), whole(1), real_(hulls), whole(hulls), whole(hulls),
+                  real_(GRIDS), whole(4, GRIDS), whole(4 * hulls + GRIDS * (CELLS + 4) + 2), real_(2 * hulls, 4),
+                  whole(2 * hulls), whole(room))
 
 
 def narrow_of(hulls: Hulls) -> Narrow:

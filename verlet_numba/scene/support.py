@@ -42,7 +42,6 @@ NOT_BUILT = (
     Missing("effects.bending", _named, _LEAVE_OUT),
     Missing("effects.rest", _named, _LEAVE_OUT),
     Missing("bodies.*.contact_geometry", _is("segments"), "use `nodes`"),
-    Missing("colliders.*.kind", _is("mesh"), "use a box, sphere, cylinder, plane or room"),
 )
 
 
