@@ -58,7 +58,7 @@ def simulate() -> Callable[..., Trajectory]:
 
 def run(scene: str | Mapping[str, Any] | Path, overrides: Mapping[str, Any] | None = None) -> Trajectory:
     loaded = load(scene, {**IN_FULL, **(overrides or {})})
-    model = start(build(loaded.scene, place(loaded.scene, loaded.folder, loaded.source)))
+    model = start(build(loaded.scene, place(loaded.scene, loaded.folder, loaded.source), loaded.folder))
     chunk = frames(model, frame_count(loaded.scene))
     assert run_chunk(model, chunk) == OK, f"{loaded.source.name} diverged"
     assert chunk.velocity is not None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-PLANE, BOX, SPHERE, CYLINDER = 0, 1, 2, 3               # Solids.kind
+PLANE, BOX, SPHERE, CYLINDER, MESH = 0, 1, 2, 3, 4      # Solids.kind
 FRAME, SUBSTEP, NUMBER, STAGE = 0, 1, 2, 3              # World.clock
 WHOLE, INTEGRATED = 0, 1                                # its stage: where a substep begins, or is taken up again
 KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
@@ -154,13 +154,32 @@ class Moving(NamedTuple):
 class Solids(NamedTuple):
     """Colliders. A room is six planes. Poses are those at the start and at the end of the current substep."""
 
-    kind: Array                 # (K,) int 1; PLANE, BOX, SPHERE or CYLINDER
-    extent: Array               # (4, K) double m; plane: normal, offset; box: half edges; else radius, half length
+    kind: Array                 # (K,) int 1; PLANE, BOX, SPHERE, CYLINDER or MESH
+    extent: Array               # (4, K) double m; plane: normal, offset; box: half edges; mesh: 0; else radius, half length
     origin: Array               # (3, K) double m; at the end of the substep
     rotation: Array             # (3, 3, K) double 1; columns are the axes, at the end of the substep
     origin_before: Array        # (3, K) double m
     rotation_before: Array      # (3, 3, K) double 1
     reach: Array                # (K,) double m; radius of a sphere about the origin that holds it, infinite for planes
+
+
+class Meshes(NamedTuple):
+    """Triangles of mesh colliders in their own frames, for particles: a tree of boxes each, nodes in preorder.
+
+    Children of a node are k + 1 and skip[k + 1]. Features of a triangle are its face, its sides from corner 0, 1 and 2 on,
+    and its corners. Their normals are the pseudonormals of Baerentzen & Aanaes (2005), the sum of the adjacent faces'
+    normals, at corners weighted by angles. A mesh without a border is closed and has an inside; another is a sheet.
+    """
+
+    first: Array                # (K + 1,) int 1; nodes of collider k: first[k] to first[k + 1], none of other kinds
+    closed: Array               # (K,) int 1; 1: the mesh has no border
+    skip: Array                 # (M,) int 1; the node after the subtree; k + 1 of a leaf
+    triangle: Array             # (M,) int 1; of a leaf, -1: an inner node
+    box: Array                  # (M, 6) double m; least x, y, z, largest x, y, z
+    corner: Array               # (F, 9) double m; x, y, z of each
+    normal: Array               # (F, 21) double 1; of every feature
+    border: Array               # (F, 7) int 1; 1: the feature lies on the border
+    side: Array                 # (K, n) int 1; of a sheet that the particle was near last: 1 front, -1 behind; 0: it was not near
 
 
 class Contacts(NamedTuple):
@@ -418,6 +437,16 @@ class Manifold(NamedTuple):
     angle: Array                # (64,) double 1
 
 
+class Ridges(NamedTuple):
+    """The triangles among the hulls, and what surrounds their features (numbered as in Meshes, 7 of each triangle)."""
+
+    triangle: Array             # (H,) int 1; number of the triangle that the hull is, -1: none
+    closed: Array               # (F,) int 1; 1: of a mesh without a border, met from the front alone
+    border: Array               # (G,) int 1; 1: the feature lies on the border
+    start: Array                # (G + 1,) int 1; hulls of the triangles that share feature g: start[g] to start[g + 1] of `around`
+    around: Array               # (A,) int 1
+
+
 class Meet(NamedTuple):
     """How hulls meet."""
 
@@ -432,6 +461,7 @@ class Meet(NamedTuple):
     horizon: int                # int 1; substeps that a list of pairs shall last
     coherent: int | None        # int 1; None: nothing is remembered from the last substep
     all_pairs: int | None       # int 1; None: pairs are found by grids
+    ridges: Ridges | None       # None: there is no mesh collider
 
 
 class Trees(NamedTuple):
@@ -492,6 +522,7 @@ class Effects(NamedTuple):
     carried: Carried | None
     moving: Moving | None
     contact: Contacts | None
+    meshes: Meshes | None
     hulls: Hulls | None
     meet: Meet | None
     trees: Trees | None

@@ -120,7 +120,7 @@ def plan(scene: Path, sets: tuple[str, ...], as_json: bool) -> None:
     from verlet_numba.scene.prepare import prepare
 
     prepared = prepare(scene, sets)
-    found = make_plan(prepared, build(prepared.scene, prepared.bodies))
+    found = make_plan(prepared, build(prepared.scene, prepared.bodies, prepared.loaded.folder))
     if as_json:
         print_json(found)
     else:

@@ -15,6 +15,7 @@ from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.impact import strike_bodies, strike_spheres
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
+from verlet_numba.effects.mesh_contact import deepest_in_meshes, find_mesh_contacts
 from verlet_numba.effects.most_moved import choose_lists, remember
 from verlet_numba.effects.motion import carry, move
 from verlet_numba.effects.response import (
@@ -58,7 +59,7 @@ def advance(world, frames, budget):
     effects, solver, observed, snapshot, clock = world[8:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
-    contact, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
+    contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -89,7 +90,8 @@ def advance(world, frames, budget):
                 clock[STAGE] = INTEGRATED
             while True:                                                     # once, and again where resting bodies wake
                 free = free_of(inverse_mass, rest)
-                if not (find_contacts(position, previous, free, contact) and find_meetings(hulls, meet, rest)     # (P11 to P17)
+                if not (find_contacts(position, previous, free, contact)                # (P11 to P17)
+                        and find_mesh_contacts(position, previous, free, contact, meshes) and find_meetings(hulls, meet, rest)
                         and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
                     return FULL
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, moving):
@@ -152,7 +154,8 @@ def advance(world, frames, budget):
         f = clock[FRAME]
         sound = observe(frames.measures[f], position, snapshot, observed, h)
         frames.measures[f, PENETRATION] = max(
-            penetration(snapshot.position, inverse_mass, contact), depth_of_hulls(snapshot.position, meet, hulls),
+            penetration(snapshot.position, inverse_mass, contact),
+            deepest_in_meshes(snapshot.position, inverse_mass, contact, meshes), depth_of_hulls(snapshot.position, meet, hulls),
             deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest))
         frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order)

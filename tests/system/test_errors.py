@@ -39,8 +39,7 @@ SAMPLES = {     # an override for everything that this version may not do yet
     "solver.order": "solver.order=lines", "solver.gradient": "solver.gradient=step_start",
     "solver.deformable_contact": "solver.deformable_contact=exact", "solver.orientation_guard": "solver.orientation_guard=true",
     "effects.continuous_collision": "effects.continuous_collision=true", "effects.bending": "effects.bending={stiffness: 0.5}",
-    "effects.rest": "effects.rest={}", "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments",
-    "colliders.*.kind": "colliders=[{kind: mesh, file: bowl.stl}]"}
+    "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments"}
 DONE = ("preset=paper", "order=constraint_graph", "repeats=once", "response=feature", "projection_point=printed",
         "deformable_contact=spheres", "broad_phase=all_pairs", "gradient=current", "square_root=approximate", "precision=float32")
 

@@ -11,7 +11,7 @@ read within a loop has the references of its arrays counted each time, which cos
 """
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import BOX, PLANE, SPHERE
+from verlet_numba.buffers import BOX, MESH, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
 from verlet_numba.physics.solids import box, cylinder, plane, sphere
 
@@ -45,13 +45,14 @@ def extent_of(extent, s):
 
 @kernel
 def find_contacts(position, previous, inverse_mass, contact):
-    """List the particles within the margin of a collider. False: more than there is room for (grow and call again)."""
+    """List the particles within the margin of a collider, meshes apart. False: no room (grow and call again)."""
     if contact is None:
         return True
     contact.listed[0] = 0
     fits = True
     for s in range(contact.solids.kind.size):
-        fits = fits and list_contacts(position, previous, inverse_mass, contact, s)
+        if contact.solids.kind[s] != MESH:
+            fits = fits and list_contacts(position, previous, inverse_mass, contact, s)
     return fits
 
 
@@ -148,13 +149,15 @@ def separate(position, contact):
 
 @kernel
 def penetration(position, inverse_mass, contact):
-    """The deepest penetration of any particle [m] into any collider in its pose before this substep; 0 if none."""
+    """The deepest penetration of any particle [m] into any collider but meshes in its pose before this substep; 0 if none."""
     if contact is None:
         return 0.0
     solids, radii, planes_only, deepest = contact.solids, contact.radius, contact.planes_only, 0.0
     x, y, z = position[0], position[1], position[2]
     for s in range(solids.kind.size):
         kind, extent = solids.kind[s], extent_of(solids.extent, s)
+        if kind == MESH:
+            continue
         pose = pose_of(solids.origin_before, solids.rotation_before, s)
         for k in range(inverse_mass.size):
             if inverse_mass[k] > 0 and not (planes_only[k] and kind != PLANE):

@@ -4,6 +4,7 @@ from verlet_numba._jit import inlined, kernel
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.effects.features import point_of
 from verlet_numba.kernels.candidates import FULL, refresh
+from verlet_numba.kernels.internal_edges import straighten
 from verlet_numba.kernels.manifold import widen
 from verlet_numba.kernels.narrow import collide, gather_hulls
 from verlet_numba.physics.pose import outward
@@ -42,6 +43,7 @@ def find_meetings(hulls, meet, rest):
         return False
     if not collide(hulls, meet.pairs, meet.meetings, meet.narrow, margin, meet.coherent, quiet_of(rest)):
         return False
+    straighten(hulls, meet.pairs, meet.meetings, meet.ridges)
     return several(hulls, meet.pairs, meet.meetings, meet.manifold)
 
 

@@ -133,6 +133,8 @@ class State:
             search, meetings = meet.search, meet.meetings
             arrays += [*meet.pairs, search.made, search.anchor, search.extent, search.last, search.turn,
                        *meetings]
+        if effects.meshes is not None:
+            arrays += [effects.meshes.side]
         if touches is not None:
             arrays += [touches.until, touches.given]
         if effects.spheres is not None:

@@ -69,7 +69,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     """
     summary = Summary(str(output))
     clock = time.perf_counter()
-    model = build(prepared.scene, prepared.bodies)
+    model = build(prepared.scene, prepared.bodies, prepared.loaded.folder)
     total = frame_count(prepared.scene) if count is None else count + 1
     summary.seconds["build"] = time.perf_counter() - clock
     with Progress(total, prepared.scene.solver.substeps, quiet) as progress:

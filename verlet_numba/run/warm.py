@@ -22,5 +22,5 @@ def paper_scenes() -> list[Path]:
 def warm_up(prepared: Prepared) -> tuple[float, Path]:
     """Compile, or load from the cache, everything a scene needs. Returns seconds and the cache's folder."""
     clock = time.perf_counter()
-    warm(start(build(prepared.scene, prepared.bodies)))
+    warm(start(build(prepared.scene, prepared.bodies, prepared.loaded.folder)))
     return time.perf_counter() - clock, CACHE

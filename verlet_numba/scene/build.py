@@ -1,6 +1,7 @@
 """A scene's bodies become the world that the frame loop advances. Nothing here needs Numba."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,8 +46,11 @@ class Model:
         return len(self.world.observed.scene_order)
 
 
-def build(scene: Scene, bodies: list[Body]) -> Model:
-    """Number the particles and lay out everything that the scene calls for. The particles have no place yet."""
+def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
+    """Number the particles and lay out everything that the scene calls for. The particles have no place yet.
+
+    Files of mesh colliders are sought from `folder`.
+    """
     real = np.dtype(scene.solver.precision)
     numbering = number(bodies)
     size = padded(numbering.size, real.itemsize)
@@ -56,7 +60,7 @@ def build(scene: Scene, bodies: list[Body]) -> Model:
     inverse_mass = spread(numbering, [move / mass for move, mass in zip(moves, masses, strict=True)], size)
 
     together = attachments(scene, bodies, numbering)
-    effects = effects_of(scene, bodies, numbering, together, inverse_mass, real)
+    effects = effects_of(scene, folder, bodies, numbering, together, inverse_mass, real)
     ordered = scene.solver.order == "constraint_graph"
     joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real, rigid=not ordered)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
@@ -78,10 +82,10 @@ def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
     return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.bucket), -1), np.int64))
 
 
-def effects_of(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
+def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
                real: Any) -> Effects:
     """What the scene calls for, None for everything else."""
-    contact = contact_of(scene, bodies, numbering, together, inverse_mass, real)
+    contact = contact_of(scene, folder, bodies, numbering, together, inverse_mass, real)
     return Effects(forces.gravity(scene.effects, inverse_mass, real),
                    forces.wind(scene.effects, bodies, numbering, inverse_mass, real),
                    forces.drag(scene.effects, inverse_mass, real),

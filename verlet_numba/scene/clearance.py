@@ -63,16 +63,23 @@ def hull_clearance(positions: Floats, triangles: Integers, points: Floats) -> Fl
 
 
 def surface_distance(vertices: Floats, triangles: Integers, points: Floats) -> Floats:
-    """Distance (N,) from a triangulated surface, negative where it winds around the point (Jacobson et al. 2013)."""
-    distance = np.empty(len(points))
+    """Distance (N,) from a triangulated surface, negative where a closed one winds around the point (Jacobson et al. 2013)."""
+    distance, closed = np.empty(len(points)), is_closed(triangles)
     chunk = max(1, CHUNK // len(triangles))
     for start in range(0, len(points), chunk):
         corners = vertices[triangles][None] - points[start:start + chunk, None, None]         # (n, F, 3, 3)
         a, b, c = corners[:, :, 0], corners[:, :, 1], corners[:, :, 2]
         inside = np.abs(_solid_angle(a, b, c).sum(axis=1)) > 2 * np.pi
         nearest = np.sqrt(_squared_distance(a, b, c).min(axis=1))
-        distance[start:start + chunk] = np.where(inside, -nearest, nearest)
+        distance[start:start + chunk] = np.where(inside & closed, -nearest, nearest)
     return distance
+
+
+def is_closed(triangles: Integers) -> bool:
+    """Whether every side of consistently wound triangles (F, 3) is that of another one too, run along the other way."""
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    return len(np.setdiff1d(sides[:, 0] * (triangles.max() + 1) + sides[:, 1],
+                            sides[:, 1] * (triangles.max() + 1) + sides[:, 0])) == 0
 
 
 def _solid_angle(a: Floats, b: Floats, c: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """Colliders of a scene as buffers: solids in their poses, what moves them, and the contacts of particles with them."""
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from verlet_numba.buffers import (
     BOX,
     CYLINDER,
+    MESH,
     PLANE,
     SPHERE,
     Array,
@@ -18,7 +20,9 @@ from verlet_numba.buffers import (
     gate,
 )
 from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.clearance import Surface
 from verlet_numba.scene.numbering import Numbering, spread
+from verlet_numba.scene.occupied import surface_of
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_colliders import BaseCollider
 
@@ -29,7 +33,7 @@ FIRST_ROOM = 64         # contacts; buffers grow as needed
 
 
 class Solid(NamedTuple):
-    """One convex surface of a collider."""
+    """One surface of a collider, convex unless it is a mesh."""
 
     kind: int
     extent: tuple[float, float, float, float]
@@ -37,6 +41,7 @@ class Solid(NamedTuple):
     rotation: Floats        # (3, 3), columns are its axes
     reach: float
     collider: BaseCollider
+    surface: Surface | None = None      # of a mesh, about its origin
 
 
 def turned_to(axis: Any) -> Floats:
@@ -47,8 +52,8 @@ def turned_to(axis: Any) -> Floats:
     return np.stack([u, np.cross(w, u), w], axis=1)
 
 
-def solids(collider: Any) -> list[Solid]:
-    """The surfaces of a collider: a room has six, every other kind one."""
+def solids(collider: Any, folder: Path) -> list[Solid]:
+    """The surfaces of a collider: a room has six, every other kind one. Files of meshes are sought from `folder`."""
     identity, far = np.eye(3), np.inf
     start = np.array(collider.point if collider.kind == "plane" else collider.position, float)
     match collider.kind:
@@ -67,6 +72,10 @@ def solids(collider: Any) -> list[Solid]:
             half = 0.5 * collider.length
             extent, reach = (collider.radius, half, 0.0, 0.0), float(np.hypot(collider.radius, half))
             return [Solid(CYLINDER, extent, start, turned_to(collider.axis), reach, collider)]
+        case "mesh":
+            surface = surface_of(collider, folder)
+            reach = float(np.linalg.norm(surface[0], axis=1).max())
+            return [Solid(MESH, (0.0, 0.0, 0.0, 0.0), start, identity, reach, collider, surface)]
     raise AssertionError(f"collider kind {collider.kind}")
 
 
@@ -77,9 +86,9 @@ def paths(points: list[Floats]) -> Paths:
     return Paths(gate(first, np.int64), gate(knots[:, 0], np.float64), gate(knots[:, 1:].T, np.float64))
 
 
-def solids_of(scene: Scene) -> tuple[list[Solid], Solids]:
+def solids_of(scene: Scene, folder: Path) -> tuple[list[Solid], Solids]:
     """All surfaces of a scene at time 0."""
-    found = [solid for collider in scene.colliders for solid in solids(collider)]
+    found = [solid for collider in scene.colliders for solid in solids(collider, folder)]
     origin = np.array([solid.origin for solid in found]).reshape(-1, 3).T
     rotation = np.array([solid.rotation for solid in found]).reshape(-1, 3, 3).transpose(1, 2, 0)
     extent = np.array([solid.extent for solid in found]).reshape(-1, 4).T
@@ -120,14 +129,14 @@ def carried(bodies: list[Body], numbering: Numbering) -> Carried | None:
                    gate(np.zeros((3, len(points))), np.float64), paths(points))
 
 
-def contacts(scene: Scene, bodies: list[Body], numbering: Numbering, size: int, belongs: Integers, whole: bool,
+def contacts(placed: Solids, bodies: list[Body], numbering: Numbering, size: int, belongs: Integers, whole: bool,
              real: Any) -> Contacts | None:
     """Contact of particles with colliders; belongs (n,): rigid body or -1; whole: those answer for their particles."""
-    if not scene.colliders:
+    if placed.kind.size == 0:
         return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
     answers = belongs if whole else np.full(size, -1)
-    return Contacts(solids_of(scene)[1], gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
+    return Contacts(placed, gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
                     gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
                     gate(np.zeros(size), np.float64), gate(np.zeros(size), np.int64),
                     gate(np.zeros(size), np.float64), gate(np.full(size, -2), np.int64))

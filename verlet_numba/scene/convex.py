@@ -54,7 +54,7 @@ def body_families(bodies: list[Body], numbering: Numbering) -> list[Family]:
 
 
 def collider_family(s: int, solid: Solid) -> list[Family]:
-    """The hull of a collider, if it has one: planes are met by vertices."""
+    """The hulls of a collider: every triangle of a mesh, none of a plane, which vertices meet."""
     x, y, z, _ = solid.extent
     rounding = 0.0
     if solid.kind == BOX:
@@ -67,10 +67,20 @@ def collider_family(s: int, solid: Solid) -> list[Family]:
         rim = np.stack([x * np.cos(turn), x * np.sin(turn), np.full(CYLINDER_SIDES, y)], axis=1)
         local = np.concatenate([rim, rim * [1, 1, -1]])
         hull = part(local, np.arange(len(local)))
+    elif solid.surface is not None:
+        return [mesh_family(s, solid, *solid.surface)]
     else:
         return []
     points = solid.origin + local @ solid.rotation.T
     return [Family(np.array([-1]), s, np.full((1, len(local)), -1), points[None], local, (hull,), rounding)]
+
+
+def mesh_family(s: int, solid: Solid, vertices: Floats, triangles: Integers) -> Family:
+    """The triangles of a mesh collider, each a hull of three corners."""
+    alone = np.zeros(4, np.int64), np.zeros(0, np.int64)
+    parts = tuple(Part(triangle, triangle[None], *alone) for triangle in triangles)
+    points = solid.origin + vertices @ solid.rotation.T
+    return Family(np.array([-1]), s, np.full((1, len(vertices)), -1), points[None], vertices, parts, 0.0)
 
 
 def hulls_and_particles(bodies: list[Body], numbering: Numbering, particles: Integers, radius: Floats) -> Hulls:
@@ -94,7 +104,7 @@ def hulls_of_family(family: Family) -> Hulls:
     start = np.concatenate([[0], np.cumsum(np.tile([len(corners) for corners in padded], copies))])
     centre = np.stack([points[:, hull.corners].mean(axis=1) for hull in parts], axis=1)             # (K, M, 3)
     reach = [np.linalg.norm(points[:, hull.corners] - centre[:, [m]], axis=2).max(axis=1) for m, hull in enumerate(parts)]
-    flat = [rests_on_a_face(*surface_of(local, hull)) for hull in parts]
+    flat = [len(hull.corners) == 3 or rests_on_a_face(*surface_of(local, hull)) for hull in parts]
     climbed = [hull for hull in parts if len(hull.neighbour)]
     row = np.cumsum([0, *(len(hull.corners) if len(hull.neighbour) else 0 for hull in parts)])[:-1]
     graph = np.where([len(hull.neighbour) > 0 for hull in parts], row, -1)

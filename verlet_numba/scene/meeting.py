@@ -1,5 +1,6 @@
 """What meets what in a scene, and the buffers for it."""
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from verlet_numba.buffers import (
     Friction,
     Hulls,
     Meet,
+    Meshes,
     Mixed,
     Moving,
     Rest,
@@ -31,6 +33,7 @@ from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, so
 from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests_on_faces
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
+from verlet_numba.scene.mesh_collider import meshes_of, ridges_of
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.rest import rest_of
 from verlet_numba.scene.rigid import belongs_to, rigid_bodies, rigid_of, touches_of
@@ -46,6 +49,7 @@ LISTING_MARGIN = 0.5        # of the deformable bodies' spacing: how near partic
 class Contact(NamedTuple):
     moving: Moving | None = None
     contact: Contacts | None = None
+    meshes: Meshes | None = None
     hulls: Hulls | None = None
     meet: Meet | None = None
     trees: Trees | None = None
@@ -60,7 +64,7 @@ class Contact(NamedTuple):
     rest: Rest | None = None
 
 
-def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
+def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
                real: Any) -> Contact:
     """Contact of bodies with colliders and each other, and the materials that meet; None for what cannot happen.
 
@@ -68,10 +72,10 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     """
     if scene.effects.contact == "none" or not (inverse_mass > 0).any():
         return Contact()
-    size, (found, _) = len(inverse_mass), solids_of(scene)
+    size, (found, placed) = len(inverse_mass), solids_of(scene, folder)
     belongs = belongs_to(bodies, numbering, size)
     as_whole = scene.solver.response == "body" and bool((belongs >= 0).any())
-    contact = contacts(scene, bodies, numbering, size, belongs, as_whole, real)
+    contact = contacts(placed, bodies, numbering, size, belongs, as_whole, real)
     hulls, meet = hulls_meeting(scene, bodies, numbering, found, belongs, inverse_mass)
     trees, spheres, points, mixed = soft_meeting(scene, bodies, numbering, together, inverse_mass, real)
     meets = meet is not None or mixed is not None
@@ -85,8 +89,8 @@ def contact_of(scene: Scene, bodies: list[Body], numbering: Numbering, together:
     if scene.solver.response == "feature" and meets:
         features = Features(POINTS[scene.solver.projection_point], body_masses(bodies, numbering, inverse_mass, hulls),
                             body_masses(bodies, numbering, inverse_mass, points))
-    return Contact(moving(found) if contact is not None else None, contact, hulls, meet, trees, spheres, points, mixed,
-                   rigid, touches, features,
+    return Contact(moving(found) if contact is not None else None, contact, meshes_of(found, size), hulls, meet, trees, spheres,
+                   points, mixed, rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
                    restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
                    rest_of(scene, bodies, numbering, inverse_mass, hulls, real) if mixed is None else None)
@@ -101,7 +105,7 @@ def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found:
     still = still_hulls(hulls, belongs, inverse_mass)
     if still.all():
         return None, None
-    return hulls, meet_of(scene, hulls, still)
+    return hulls, meet_of(scene, found, hulls, still)
 
 
 def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -167,11 +171,12 @@ def still_hulls(hulls: Hulls, belongs: Integers, inverse_mass: Floats) -> Array:
     return ~moves[hulls.body]           # the last is what number -1, a collider, finds
 
 
-def meet_of(scene: Scene, hulls: Hulls, still: Array) -> Meet:
+def meet_of(scene: Scene, found: list[Solid], hulls: Hulls, still: Array) -> Meet:
     """How the hulls of a scene meet."""
     reach = hulls.reach[hulls.body >= 0]
     as_whole = scene.solver.response == "body"
     manifold = manifold_of(int(hulls.size.max()), FIRST_ROOM) if as_whole and rests_on_faces(hulls) else None
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
                 narrow_of(hulls), manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
-                min(scene.solver.substeps, LASTING), 1, 1 if scene.solver.broad_phase == "all_pairs" else None)
+                min(scene.solver.substeps, LASTING), 1, 1 if scene.solver.broad_phase == "all_pairs" else None,
+                ridges_of(found, hulls))

@@ -8,7 +8,7 @@ from verlet_numba.scene import rigidity
 from verlet_numba.scene.body import Floats, Integers, Shape
 from verlet_numba.scene.clearance import hull_clearance
 from verlet_numba.scene.crossing import crossed
-from verlet_numba.scene.half_edge import SurfaceError, half_edges
+from verlet_numba.scene.half_edge import HalfEdges, SurfaceError, half_edges
 from verlet_numba.scene.hulls import hull_faces, is_convex, split, volume
 from verlet_numba.scene.shapes import ShapeError, edges, share_mass, stick_lengths
 
@@ -91,10 +91,31 @@ def _merged(positions: Floats, triangles: Integers) -> tuple[Floats, Integers]:
     return positions[first[order]], number[inverse.ravel()][corners].reshape(-1, 3)
 
 
+def surface(file: Path) -> tuple[Floats, Integers]:
+    """Vertices (P, 3) and triangles (F, 3) of a surface from a file, each triangle once; outwards if it is closed.
+
+    Raises ShapeError, naming the triangle, for one that is not consistently wound or has triangles without area.
+    """
+    positions, listed = load(file)
+    kept, built = check_surface(positions, listed)
+    return positions, outwards(positions, listed[kept]) if (built.twin >= 0).all() else listed[kept]
+
+
 def check_closed(positions: Floats, triangles: Integers) -> Integers:
     """The numbers of the triangles, in ascending order, the first of those that are repeated.
 
     Raises ShapeError unless all have areas and together are closed, consistently wound surfaces.
+    """
+    kept, built = check_surface(positions, triangles)
+    _refuse_first(kept[built.face[built.twin < 0]], positions, triangles, "has an open side: the surface must be closed")
+    _refuse_first(kept[built.pinched()], positions, triangles, "has a corner where the surface meets itself in a point")
+    return kept
+
+
+def check_surface(positions: Floats, triangles: Integers) -> tuple[Integers, HalfEdges]:
+    """The numbers of the triangles, in ascending order, the first of those that are repeated, and their half-edges.
+
+    Raises ShapeError unless all have areas and together are consistently wound surfaces.
     """
     p, q, r = (positions[triangles[:, corner]] for corner in range(3))
     longest = np.max([np.linalg.norm(side, axis=1) for side in (q - p, r - q, p - r)], axis=0)
@@ -109,9 +130,7 @@ def check_closed(positions: Floats, triangles: Integers) -> Integers:
         built = half_edges(once)
     except SurfaceError as error:
         raise _refusal(int(kept[error.face]), positions, triangles, str(error)) from error
-    _refuse_first(kept[built.face[built.twin < 0]], positions, triangles, "has an open side: the surface must be closed")
-    _refuse_first(kept[built.pinched()], positions, triangles, "has a corner where the surface meets itself in a point")
-    return kept
+    return kept, built
 
 
 def _refuse_first(wrong: Integers, positions: Floats, triangles: Integers, what: str) -> None:

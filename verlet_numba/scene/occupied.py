@@ -13,6 +13,7 @@ from verlet_numba.scene.problems import Problem
 from verlet_numba.scene.scatter import Free
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_bodies import Body as Entry
+from verlet_numba.scene.schema_colliders import MeshCollider
 from verlet_numba.scene.schema_common import Rotation
 from verlet_numba.scene.shapes import ShapeError
 from verlet_numba.scene.source import Source
@@ -44,15 +45,19 @@ def load_surfaces(scene: Scene, folder: Path, source: Source) -> tuple[dict[int,
     problems: list[Problem] = []
     for index, collider in enumerate(scene.colliders):
         if collider.kind == "mesh":
-            from verlet_numba.scene.mesh import load
-
             try:
-                vertices, triangles = load(folder / collider.file)
+                surfaces[index] = surface_of(collider, folder)
             except ShapeError as error:
                 problems.append(source.problem(("colliders", index, error.key), str(error)))
-                continue
-            surfaces[index] = vertices * collider.scale @ rotation_matrix(collider.rotation).T, triangles
     return surfaces, problems
+
+
+def surface_of(collider: MeshCollider, folder: Path) -> Surface:
+    """The surface of a mesh collider, turned, about its origin. Raises ShapeError for a file that will not do."""
+    from verlet_numba.scene.mesh import surface
+
+    vertices, triangles = surface(folder / collider.file)
+    return vertices * collider.scale @ rotation_matrix(collider.rotation).T, triangles
 
 
 class Occupied:

@@ -41,7 +41,6 @@ NOT_BUILT = (
     Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
     Missing("effects.bending", _named, _LEAVE_OUT),
     Missing("bodies.*.contact_geometry", _is("segments"), "use `nodes`"),
-    Missing("colliders.*.kind", _is("mesh"), "use a box, sphere, cylinder, plane or room"),
 )
 
 
