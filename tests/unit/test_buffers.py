@@ -20,6 +20,8 @@ SCENES = {
     "single": worlds.with_changes(worlds.EVERYTHING, solver={"precision": "float32"}, output={"precision": "float32"}),
     "free": worlds.FREE,
     "empty": {"time": {"duration": 1}, "effects": {}},
+    "meshes": worlds.with_changes(worlds.EVERYTHING, colliders=[
+        {"kind": "mesh", "file": str(Path(__file__).parents[2] / "scenes/gallery/bowl.obj")}, {"kind": "plane"}]),
     "one pass": worlds.with_changes(worlds.EVERYTHING, solver={"iterations": 1, "tolerance": 0.01, "square_root": "approximate"},
                                     effects={"friction": None, "restitution": None, "gravity": None})}
 
