@@ -26,6 +26,8 @@ SCENES = {
     "free": worlds.FREE,
     "paper": worlds.PAPER,
     "empty": {"time": {"duration": 1}, "effects": {}},
+    "meshes": worlds.with_changes(worlds.EVERYTHING, colliders=[
+        {"kind": "mesh", "file": str(Path(__file__).parents[2] / "scenes/gallery/bowl.obj")}, {"kind": "plane"}]),
     "one pass": worlds.with_changes(worlds.EVERYTHING, solver={"iterations": 1, "tolerance": 0.01, "square_root": "approximate"},
                                     effects={"friction": None, "restitution": None, "gravity": None})}
 
