@@ -188,8 +188,8 @@ def test_what_is_not_written_or_switched_off_is_no_matter() -> None:
 
 
 def test_an_override_that_is_not_built_is_refused_too() -> None:
-    problem, = unsupported(loads(SMALL, "s.yaml", ["solver.response=feature"]))
-    assert (problem.file, problem.column) == ("--set solver.response=feature", 8)
+    problem, = unsupported(loads(SMALL, "s.yaml", ["solver.order=lines"]))
+    assert (problem.file, problem.column) == ("--set solver.order=lines", 8)
 
 
 def test_loading_needs_no_heavy_library() -> None:
