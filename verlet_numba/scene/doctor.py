@@ -156,16 +156,16 @@ def selves(scene: Scene, bodies: list[Body]) -> Warnings:
 
 
 def rebounds(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Restitution that has no effect: particles rebound from colliders, rigid bodies from planes and rooms, nobody from another."""
+    """Restitution that has no effect: with the paper's response hulls do not rebound from hulls."""
+    if scene.solver.response == "body" or scene.effects.contact == "none":
+        return
     several = sum(body.copies for body in bodies) > 1
     solid = any(collider.kind not in ("plane", "room") for collider in scene.colliders)
     for index, body in enumerate(bodies):
-        rigid = body.shape.rigid
-        if body.restitution > 0 and (several or (rigid and solid)):
+        if body.shape.rigid and body.restitution > 0 and (several or solid):
             path = ("effects",) if scene.bodies[index].restitution is None else ("bodies", index)
-            where = "planes and rooms" if rigid else "colliders"
-            yield (*path, "restitution"), (f"{body.name} rebounds from {where} alone: restitution between "
-                                           f"{'hulls' if rigid else 'bodies'} is not simulated yet")
+            yield (*path, "restitution"), (f"with `response: feature` {body.name} rebounds from planes and rooms alone, not from "
+                                           "other hulls: use `response: body`")
             return
 
 

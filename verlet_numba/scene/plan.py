@@ -109,9 +109,8 @@ def contacts(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("whole-body response", rigid, kept if rigid or solver.response == "feature" else met)
     yield Phase("feature response", features, kept if features or solver.response == "body" else none or "no hulls meet")
     touch = bool(active.contact or hulls or active.spheres)
-    yield Phase("restitution", active.contact is not None and active.restitution is not None,
-                "no collider is met, and only colliders give speed back" if active.contact is None
-                else material_reason(active.restitution, "restitution"))
+    yield Phase("restitution", active.restitution is not None,
+                material_reason(active.restitution, "restitution") if touch else "nothing touches")
     yield Phase("friction", active.friction is not None,
                 material_reason(active.friction, "friction") if touch else "nothing touches")
 

@@ -209,18 +209,20 @@ def test_what_cannot_meet_itself():
 
 def test_restitution_that_has_no_effect():
     text = """
+solver: {response: %s}
 effects: {restitution: %s}
 bodies: [{kind: %s, mass: 1, position: [0, 0, 3]}]
 colliders: [{kind: plane}, {kind: room, size: [9, 9, 9]}%s]
 """
     box, cloth = "box, size: [1, 1, 1]", "cloth, size: [1, 1], resolution: [9, 9]"
     post = ", {kind: box, size: [1, 1, 1], position: [3, 3, 3]}"
-    assert paths(text % (0.5, box, ""), "rebounds") == []
-    assert paths(text % (0.5, box, post), "box_0 rebounds from planes and rooms alone") == ["effects.restitution"]
-    assert paths(text % (0, box, post), "rebounds") == []
-    assert paths(text % (0.5, cloth, post), "rebounds") == []
+    assert paths(text % ("feature", 0.5, box, ""), "rebounds") == []
+    assert paths(text % ("feature", 0.5, box, post), "box_0 rebounds from planes and rooms alone") == ["effects.restitution"]
+    assert paths(text % ("body", 0.5, box, post), "rebounds") == []
+    assert paths(text % ("feature", 0, box, post), "rebounds") == []
+    assert paths(text % ("feature", 0.5, cloth, post), "rebounds") == []
     other = ", restitution: 1}, {kind: box, size: [1, 1, 1], mass: 1, position: [2, 2, 2]}]\ncoll"
-    two = (text % (0, box, "")).replace("}]\ncoll", other)
+    two = (text % ("feature", 0, box, "")).replace("}]\ncoll", other)
     assert paths(two, "rebounds from planes and rooms alone") == ["bodies.0.restitution"]
 
 

@@ -65,7 +65,7 @@ def test_phases_that_are_there(bodies, rest, phase, why):
     ([ROPE % ""], "", "deformable against rigid", "no rigid body"),
     (TWO, "", "deformable against rigid", "no deformable body"),
     (TWO, "", "contact with colliders", "the scene has no collider"),
-    (TWO, "effects: {restitution: 1}", "restitution", "no collider is met, and only colliders give speed back"),
+    (TWO[:1], "effects: {restitution: 1}", "restitution", "nothing touches"),
     (TWO[:1], "effects: {friction: 1}", "friction", "nothing touches"),
     (TWO, "", "constraint graph", "solver.order is sequential, or there is no rigid body"),
 ])
