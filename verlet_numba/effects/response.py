@@ -319,8 +319,13 @@ def shove(friction, rigid, touches):
                 if push == 0.0 and j == 0.0:            # apart, and it was: nothing to grip
                     continue
                 given[t, 0] = push
-                gx, gy, gz = grip(friction, line, answer, given, t, push, ux, uy, uz)
-                jx, jy, jz = j * nx + gx, j * ny + gy, j * nz + gz
+                px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
+                sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
+                f, g = grip(friction, given[t, 1], given[t, 2], px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz,
+                            answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9], answer[t, 2] * push, answer[t, 3] * push)
+                df, dg = f - given[t, 1], g - given[t, 2]
+                given[t, 1], given[t, 2] = f, g
+                jx, jy, jz = j * nx + df * px + dg * qx, j * ny + df * py + dg * qy, j * nz + df * pz + dg * qz
                 if jx != 0.0 or jy != 0.0 or jz != 0.0:
                     strike(twist, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
                     strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
@@ -330,31 +335,25 @@ def shove(friction, rigid, touches):
                 break
 
 
-@kernel
-def grip(friction, line, answer, given, t, push, ux, uy, uz):
-    """The impulse that takes back the slide of touch t as far as friction holds under so great a push; u: slide since aimed.
+@formula
+def grip(friction, f, g, p, q, uu, uv, vv, least, static, dynamic):
+    """The impulse across in two directions, (f, g) so far, that takes back the slide (p, q) as far as friction holds.
 
-    What sticks needs the inverse of the responses across. Where it slides, friction f shall oppose the slide s itself:
-    f <- f - s/k, cut to the cone, ends with f along -s for a number k, as it would not for a matrix; k is the matrix'
-    greatest eigenvalue, so that no step goes too far.
+    uu, uv, vv: inverse of the responses across, its least eigenvalue; static, dynamic: as much as friction can hold.
+
+    What sticks needs that inverse. Where it slides, friction f shall oppose the slide s itself: f <- f - s/k, cut to the
+    cone, ends with f along -s for a number k, as it would not for a matrix; k is the responses' greatest eigenvalue, so that
+    no step goes too far.
     """
     if friction is None:
-        return 0.0, 0.0, 0.0
-    px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
-    sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
-    p, q = px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz
-    f = given[t, 1] - (answer[t, 5] * p + answer[t, 6] * q)
-    g = given[t, 2] - (answer[t, 6] * p + answer[t, 7] * q)
-    length = math.sqrt(f * f + g * g)
-    if length > answer[t, 2] * push:                # it slides
-        least = answer[t, 9]
-        f, g = given[t, 1] - least * p, given[t, 2] - least * q
-        length = math.sqrt(f * f + g * g)
-        share = min(1.0, answer[t, 3] * push / length) if length > 0.0 else 0.0
-        f, g = share * f, share * g
-    df, dg = f - given[t, 1], g - given[t, 2]
-    given[t, 1], given[t, 2] = f, g
-    return df * px + dg * qx, df * py + dg * qy, df * pz + dg * qz
+        return 0.0, 0.0
+    x, y = f - (uu * p + uv * q), g - (uv * p + vv * q)
+    if x * x + y * y > static * static:             # it slides
+        x, y = f - least * p, g - least * q
+        length = math.sqrt(x * x + y * y)
+        share = min(1.0, dynamic / length) if length > 0.0 else 0.0
+        x, y = share * x, share * y
+    return x, y
 
 
 @kernel
@@ -416,10 +415,15 @@ def rebound(friction, rigid, touches):
                 total = min(most, max(-given[t, 0], given[t, 3] + (answer[t, 4] - leaving) * answer[t, 1]))
                 j = total - given[t, 3]
                 given[t, 3] = total
-                gx = gy = gz = 0.0
+                jx, jy, jz = j * nx, j * ny, j * nz
                 if total > 0.0:
-                    gx, gy, gz = grip(friction, line, answer, given, t, given[t, 0] + total, ux, uy, uz)
-                jx, jy, jz = j * nx + gx, j * ny + gy, j * nz + gz
+                    push = given[t, 0] + total
+                    px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
+                    f, g = grip(friction, given[t, 1], given[t, 2], px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz,
+                                answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9], answer[t, 2] * push, answer[t, 3] * push)
+                    df, dg = f - given[t, 1], g - given[t, 2]
+                    given[t, 1], given[t, 2] = f, g
+                    jx, jy, jz = jx + df * px + dg * qx, jy + df * py + dg * qy, jz + df * pz + dg * qz
                 if jx != 0.0 or jy != 0.0 or jz != 0.0:
                     strike(kick, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
                     strike(kick, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
