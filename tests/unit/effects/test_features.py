@@ -29,10 +29,10 @@ class Case:
         self.indices = [index[0] for index in self.model.numbering.bodies]
         e = self.effects = world.effects
         gather(self.x, e.hulls)
-        assert find_meetings(e.hulls, e.meet)
+        assert find_meetings(e.hulls, e.meet, e.rest)
         assert e.meet.meetings.listed[0] == 1
         self.before = self.x.copy()
-        begin_features(e.meet, e.features)
+        begin_features(self.w, e.meet, e.hulls, e.features)
         part_features(self.x, self.w, e.meet, e.hulls, e.features, HULLS)
         if rub:
             self.before = self.x.copy()
@@ -153,6 +153,6 @@ def test_the_particle_that_parting_moved_most_leads_the_relaxation():
 
 
 def test_nothing_to_part_is_nothing():
-    begin_features(None, None)
+    begin_features(None, None, None, None)
     part_features(None, None, None, None, None, HULLS)
     rub_features(None, None, None, None, None, None, None, HULLS)

@@ -50,14 +50,14 @@ class Case:
         """Touches are found, weighed and aimed."""
         e = self.effects
         gather(self.x, e.hulls)
-        assert find_meetings(e.hulls, e.meet)
+        assert find_meetings(e.hulls, e.meet, e.rest)
         begin_touches(e.rigid, e.touches)
         touch_colliders(e.contact, e.friction, e.restitution, e.rigid, e.touches)
-        touch_hulls(e.meet, e.hulls, e.friction, e.rigid, e.touches, HULLS)
+        touch_hulls(e.meet, e.hulls, e.friction, e.restitution, e.rigid, e.touches, HULLS)
         weigh(self.x, self.previous, self.w, e.rigid)
         link(e.rigid, e.touches)
         recall_colliders(e.contact, e.rigid, e.touches, number)
-        recall_hulls(e.meet, e.rigid, e.touches, HULLS)
+        recall_hulls(e.meet, e.rigid, e.touches, HULLS, number)
         aim_colliders(self.x, e.contact, e.rigid, e.touches, number, H)
         aim_hulls(e.meet, e.hulls, e.contact, e.rigid, e.touches, HULLS, number, H)
         respond(e.friction, e.rigid, e.touches)

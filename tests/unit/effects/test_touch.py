@@ -129,5 +129,5 @@ def test_touches_are_contacts_and_meetings_with_the_world_as_second():
 def test_no_rigid_body_no_touch():
     begin_touches(None, None)
     touch_colliders(None, None, None, None, None)
-    touch_hulls(None, None, None, None, None, HULLS)
+    touch_hulls(None, None, None, None, None, None, HULLS)
     weigh(None, None, None, None)
