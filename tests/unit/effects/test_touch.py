@@ -30,6 +30,7 @@ class Case:
         self.x, self.previous, self.rigid = x, previous, world.effects.rigid
         self.rigid.order[:len(self.indices)] = np.arange(len(self.indices))
         self.rigid.touched[0] = len(self.indices)
+        self.rigid.parent[:len(self.indices)] = np.arange(len(self.indices))
         weigh(x, previous, self.inverse_mass, self.rigid)
 
     def body(self, b):

@@ -18,7 +18,9 @@ def sorted_islands(first, second):
     touched = np.union1d(first, second)
     parent[touched] = touched
     parent[WORLD] = -1
-    many = sort_islands(np.r_[first, 7, 7, 7], np.r_[second, 8, 8, 8], len(first), WORLD, parent, label, order, island)
+    mass = np.ones((ENTITIES, 10))
+    mass[WORLD] = 0
+    many = sort_islands(np.r_[first, 7, 7, 7], np.r_[second, 8, 8, 8], len(first), mass, parent, label, order, island)
     return [list(order[island[i]:island[i + 1]]) for i in range(many)]
 
 
