@@ -37,7 +37,7 @@ from verlet_numba.effects.features import begin_features, part_features, rub_fea
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.meet import find_meetings, gather
-from verlet_numba.effects.most_moved import choose_lists, remember
+from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.touch import HULLS
 from verlet_numba.kernels.integrate import integrate
 from verlet_numba.kernels.relax import relax_runs, relax_sticks
@@ -94,7 +94,7 @@ def fall_and_meet(model: Model) -> World:
         model.world = grown(model.world)
     effects = model.world.effects
     begin_features(inverse_mass, effects.meet, effects.hulls, effects.features)
-    remember(position, model.world.collided)
+    note_places(position, model.world.collided)
     return model.world
 
 

@@ -16,7 +16,7 @@ from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.impact import strike_bodies, strike_spheres
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
 from verlet_numba.effects.mesh_contact import deepest_in_meshes, find_mesh_contacts
-from verlet_numba.effects.most_moved import choose_lists, remember
+from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
 from verlet_numba.effects.response import (
     aim_colliders,
@@ -115,7 +115,7 @@ def advance(world, frames, budget):
             strike_spheres(position, previous, inverse_mass, acceleration, spheres, restitution, h)
             forget(runs_softness)
             forget(sticks_softness)
-            remember(position, collided)
+            note_places(position, collided)
             for again in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
                 part_spheres(position, previous, inverse_mass, spheres)         # (P22)

@@ -61,7 +61,7 @@ def shift(x, y, z, inverse_mass, particle, corner, weight, m, side, s, dx, dy, d
 
 
 @kernel
-def share_of(point, sa, sb, ma, mb):
+def part_of_the_way(point, sa, sb, ma, mb):
     """Which part of the way the first feature moves; sa, sb: inverse masses of the features, ma, mb: masses of the bodies."""
     if sa == 0.0 or sb == 0.0:
         return 0.0 if sa == 0.0 else 1.0
@@ -93,7 +93,7 @@ def part_features(position, inverse_mass, meet, hulls, features, which):
         sa, sb = give[0, m], give[1, m]
         if sa + sb == 0.0:
             continue
-        da = share_of(point, sa, sb, mass[g], mass[h]) * depth
+        da = part_of_the_way(point, sa, sb, mass[g], mass[h]) * depth
         db = da - depth
         shift(x, y, z, inverse_mass, particle, corner, weight, m, 0, sa, da * nx, da * ny, da * nz)
         shift(x, y, z, inverse_mass, particle, corner, weight, m, 3, sb, db * nx, db * ny, db * nz)

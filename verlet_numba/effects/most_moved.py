@@ -5,7 +5,7 @@ from verlet_numba.kernels.relax_graph import sort_bodies
 
 
 @kernel
-def remember(position, collided):
+def note_places(position, collided):
     """Where the particles are before they are separated."""
     if collided is None:
         return

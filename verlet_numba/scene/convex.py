@@ -104,7 +104,7 @@ def hulls_of_family(family: Family) -> Hulls:
     start = np.concatenate([[0], np.cumsum(np.tile([len(corners) for corners in padded], copies))])
     centre = np.stack([points[:, hull.corners].mean(axis=1) for hull in parts], axis=1)             # (K, M, 3)
     reach = [np.linalg.norm(points[:, hull.corners] - centre[:, [m]], axis=2).max(axis=1) for m, hull in enumerate(parts)]
-    flat = [len(hull.corners) == 3 or rests_on_a_face(*surface_of(local, hull)) for hull in parts]
+    flat = [(solid >= 0 and len(hull.corners) == 3) or rests_on_a_face(*surface_of(local, hull)) for hull in parts]
     climbed = [hull for hull in parts if len(hull.neighbour)]
     row = np.cumsum([0, *(len(hull.corners) if len(hull.neighbour) else 0 for hull in parts)])[:-1]
     graph = np.where([len(hull.neighbour) > 0 for hull in parts], row, -1)

@@ -18,6 +18,7 @@ from verlet_numba.scene.numbering import Numbering
 INSIDE = 1 + 1e-12          # times a squared radius: what rounding may leave outside
 PATCH = 16                  # particles of a cloth: nodes with more of them, and their children, have bounds on their edges
 FIRST_ROOM = 256            # candidates; buffers grow as needed
+FEW = 500               # particles whose pairs are all looked at
 
 
 class Tree(NamedTuple):
@@ -280,10 +281,13 @@ def near_at_rest(shape: Shape) -> Integers:
     """Pairs (A, 2) of particles whose spheres overlap at rest."""
     if shape.radius == 0:
         return np.zeros((0, 2), np.int64)
-    from scipy.spatial import cKDTree  # imported here: it takes time, and only radii call for it
-
     place = shape.positions
-    pairs = cKDTree(place).query_pairs(2 * shape.radius, output_type="ndarray")
+    if len(place) <= FEW:
+        pairs = np.stack(np.triu_indices(len(place), 1), axis=1)
+    else:
+        from scipy.spatial import cKDTree  # imported here: it takes time, and only many particles call for it
+
+        pairs = cKDTree(place).query_pairs(2 * shape.radius, output_type="ndarray")
     distance = np.linalg.norm(place[pairs[:, 1]] - place[pairs[:, 0]], axis=1)
     return np.asarray(pairs[distance < 2 * shape.radius], np.int64)
 

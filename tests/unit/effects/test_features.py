@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import worlds
 
-from verlet_numba.effects.features import begin_features, part_features, rub_features, share_of
+from verlet_numba.effects.features import begin_features, part_features, part_of_the_way, rub_features
 from verlet_numba.effects.meet import find_meetings, gather
-from verlet_numba.effects.most_moved import choose_lists, remember
+from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.touch import HULLS
 
 PAPER = {"preset": "paper"}
@@ -122,7 +122,7 @@ def test_pins_never_move(point):
 
 @pytest.mark.parametrize(("shares", "expected"), [((0, 0.0, 2.0), 0.0), ((0, 2.0, 0.0), 1.0), ((0, 1.0, 3.0), 0.25)])
 def test_shares_of_the_way(shares, expected):
-    assert share_of(*shares, 1.0, 1.0) == expected
+    assert part_of_the_way(*shares, 1.0, 1.0) == expected
 
 
 def test_friction_takes_back_what_its_cone_holds_and_keeps_the_momentum():
@@ -142,7 +142,7 @@ def test_friction_takes_back_what_its_cone_holds_and_keeps_the_momentum():
 def test_the_particle_that_parting_moved_most_leads_the_relaxation():
     case = Case("feature")
     graph, collided = case.model.world.graph, case.model.world.collided
-    remember(case.before, collided)
+    note_places(case.before, collided)
     choose_lists(case.x, collided, graph)
     way = np.linalg.norm(case.x - case.before, axis=0)
     for b, first in enumerate(graph.body[0]):

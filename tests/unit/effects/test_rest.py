@@ -215,9 +215,8 @@ def test_kinds_of_bodies():
     cube, corners = SCENE["bodies"][0], list(range(8))
     more = [cube | {"name": "fixed", "fixed": True}, cube | {"name": "hung", "position": [0, 2, 1], "pinned": [0, 1]},
             cube | {"name": "carried", "position": [0, 4, 1], "pinned": corners, "path": [[0, 0, 0, 0], [1, 1, 0, 0]]},
-            cube | {"name": "tied", "position": [0, 6, 1]},
-            {"kind": "rope", "name": "line", "start": [0, 6, 3], "end": [0, 6, 1.1], "segments": 5, "mass": 1, "pinned": [0]}]
-    rest = Scene(SCENE | {"bodies": [SCENE["bodies"][1], *more], "attachments": [["line", 5, "tied", 7]]}).rest
+            cube | {"name": "tied", "position": [0, 6, 1]}]
+    rest = Scene(SCENE | {"bodies": [SCENE["bodies"][1], *more], "attachments": [["carried", 5, "tied", 7]]}).rest
     assert list(rest.kind) == [LOOSE, FIXED, HUNG, RESTLESS, RESTLESS]
     assert rest.awake[0] == 5
     assert list(rest.quiet) == [0, 1, 0, 0, 0, 1]

@@ -18,7 +18,8 @@ class Case:
         self.position = (self.previous + rng.normal(size=(3, count)) * step).astype(real)
         self.inverse_mass = (10.0 ** rng.uniform(-2, 2, count)).astype(real)
         self.inverse_mass[::7] = 0 if pins else 1
-        self.friction = Friction(np.stack([rng.uniform(0, 1, count), rng.uniform(0, 0.5, count)]).astype(real), np.zeros((2, 1)))
+        self.friction = Friction(np.stack([rng.uniform(0, 1, count), rng.uniform(0, 0.5, count)]).astype(real), np.zeros((2, 1)),
+                                 np.zeros((2, 0)), np.zeros((2, 0)))
         first, second = np.triu_indices(count, 1)
         moves = self.inverse_mass[first] + self.inverse_mass[second] > 0
         self.pairs = list(zip(first[moves], second[moves], strict=True))
