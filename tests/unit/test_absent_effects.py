@@ -35,7 +35,8 @@ SCENES = {
     "colliders at rest": (worlds.with_changes(worlds.EVERYTHING, effects=CALM, bodies=BARE, colliders=STILL, output={"fields": []}),
                           {"gravity", "contact", *MEET, *MIX, *WHOLE}),
     "a crate on the floor": (worlds.FREE | {"bodies": [*worlds.FREE["bodies"][1:], *RIGID], "colliders": [{"kind": "plane"}],
-                                           "effects": {"gravity": [0, 0, -9.81]}}, {"gravity", "contact", "trees", "points", "mixed", *WHOLE}),
+                                           "effects": {"gravity": [0, 0, -9.81]}},
+                             {"gravity", "contact", "trees", "points", "mixed", *WHOLE}),
     "free flight": (worlds.FREE, {"gravity", *SOFT}),
     "no effects": (worlds.with_changes(worlds.FREE, effects={"gravity": None}), SOFT),
     "no contact": (worlds.with_changes(worlds.FREE, effects={"contact": "none"}), {"gravity"})}
