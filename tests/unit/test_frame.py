@@ -63,6 +63,7 @@ def test_growing_the_room_for_contacts_changes_no_bit(monkeypatch):
     assert model.world.effects.mixed.meetings.pair.size > 2
 
 
+@pytest.mark.validate
 def test_single_precision_follows_for_a_while(twin):
     model = worlds.started(worlds.with_changes(worlds.APART, solver={"precision": "float32"}))
     positions, _, _ = worlds.advanced(model, 8)

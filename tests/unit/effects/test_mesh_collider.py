@@ -16,6 +16,8 @@ from verlet_numba.scene.mesh_collider import meshes_of
 from verlet_numba.scene.place import place
 from verlet_numba.scene.problems import SceneError
 
+pytestmark = pytest.mark.validate         # compiling a frame with meshes takes minutes
+
 BOWL, RADIUS = [6, 0, 2], 1.0
 LIFT, CARRY = 0.4, 0.6      # m
 

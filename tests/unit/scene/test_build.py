@@ -115,7 +115,7 @@ def part(body, first, last):
     return replace(body, positions=body.positions[first:last], velocities=body.velocities[first:last])
 
 
-@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.validate)])
 @pytest.mark.parametrize("kind", ["box", "icosahedron", "rope", "cloth"])
 def test_alone_among_copies_or_in_a_group_the_bits_are_the_same(kind, precision):
     scene, (*company, many) = dice(kind, precision)
