@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import null_space
+from scipy.optimize import brentq
 
 from verlet_numba.effects.response import RECOVERY, SETTLED, SWEEPS
 
@@ -209,10 +210,15 @@ class Whole:
         answer, slide, before = across.T @ self.answer(contact) @ across, across.T @ slide, across.T @ contact.grip
         static, dynamic = self.twin.friction(contact)
         grip = before - np.linalg.solve(answer, slide)
-        if np.linalg.norm(grip) > static * push:        # it slides: against the slide itself, by the greatest response
-            grip = before - slide / np.linalg.eigvalsh(answer)[-1]
-            length = np.linalg.norm(grip)
-            grip = grip * min(1.0, dynamic * push / length) if length > 0 else np.zeros(2)
+        if np.linalg.norm(grip) > static * push:
+            # the slide it leaves, answer (f - grip), is -a f: (answer + a) f = answer grip, with |f| = dynamic push
+            def cut(a):
+                return np.linalg.solve(answer + a * np.eye(2), answer @ grip)
+
+            limit, high = dynamic * push, 1.0
+            while np.linalg.norm(cut(high)) > limit:
+                high *= 2
+            grip = cut(brentq(lambda a: np.linalg.norm(cut(a)) - limit, 0.0, high, xtol=1e-14)) if limit > 0 else np.zeros(2)
         contact.grip = across @ grip
         return contact.grip - across @ before
 

@@ -238,8 +238,8 @@ class Touches(NamedTuple):
     island: Array               # (T + 1,) int 1; where each island begins in `order`
     label: Array                # (E,) int 1; number of the island by its root
     line: Array                 # (T, 18) double SI; normal to the first, arms of both, slide so far, two directions across
-    answer: Array               # (T, 10) double SI; wish, 1/response, static and dynamic friction, separation to leave with,
-                                # inverse of the responses across (uu, uv, vv), restitution, that inverse's least eigenvalue
+    answer: Array               # (T, 9) double SI; wish, 1/response, static and dynamic friction, separation to leave with,
+                                # inverse of the responses across (uu, uv, vv), restitution
     given: Array                # (T, 4) double kg m; push, grip in the two directions across, kick along the normal
 
 

@@ -233,7 +233,6 @@ def test_runs_repeat_and_all_pairs_are_the_pairs_of_the_grids(simulate):
     assert run.measures["penetration_max"].max() < 0.02
 
 
-@pytest.mark.xfail(strict=True, reason="one die of twenty still rolls: 1.2 m/s at the end")
 def test_dice_come_to_rest(simulate):
     run = simulate(room(20, 8)[1])
     assert run.measures["speed_max"][-60:].max() < 0.01

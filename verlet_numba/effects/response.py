@@ -129,12 +129,6 @@ def shift_of(step, moved, kick, e, rx, ry, rz):
             step[e, 2] + moved[e, 2] + kick[e, 2] + (ox * ry - oy * rx))
 
 
-@formula
-def least_of(xx, xy, yy):
-    """The least eigenvalue of the matrix [[xx, xy], [xy, yy]]."""
-    return 0.5 * (xx + yy - math.sqrt((xx - yy) * (xx - yy) + 4.0 * xy * xy))
-
-
 @kernel
 def respond(friction, rigid, touches):
     """How far the two entities of every touch give way to a unit impulse along its line, and across it."""
@@ -164,7 +158,7 @@ def respond_across(friction, line, answer, t, n, r, q, one, other):
     s = 1.0 / determinant if determinant > 0.0 else 0.0
     for e in range(3):
         line[t, 12 + e], line[t, 15 + e] = u[e], v[e]
-    answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9] = vv * s, -uv * s, uu * s, least_of(vv * s, -uv * s, uu * s)
+    answer[t, 5], answer[t, 6], answer[t, 7] = vv * s, -uv * s, uu * s
 
 
 @inlined
@@ -322,7 +316,7 @@ def shove(friction, rigid, touches):
                 px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
                 sx, sy, sz = line[t, 9] + ux, line[t, 10] + uy, line[t, 11] + uz
                 f, g = grip(friction, given[t, 1], given[t, 2], px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz,
-                            answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9], answer[t, 2] * push, answer[t, 3] * push)
+                            answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 2] * push, answer[t, 3] * push)
                 df, dg = f - given[t, 1], g - given[t, 2]
                 given[t, 1], given[t, 2] = f, g
                 jx, jy, jz = j * nx + df * px + dg * qx, j * ny + df * py + dg * qy, j * nz + df * pz + dg * qz
@@ -336,23 +330,52 @@ def shove(friction, rigid, touches):
 
 
 @formula
-def grip(friction, f, g, p, q, uu, uv, vv, least, static, dynamic):
+def sliding(f, g, xx, xy, yy, r):
+    """The impulse of size r that opposes the slide which it leaves; (f, g): the one that would leave none.
+
+    With the responses K, its inverse A = (xx, xy, yy) and f0 = (f, g), the impulse f leaves the slide K (f - f0). That is
+    -a f where (1 + a A) f = f0, and a > 0 follows from |f| = r: 1/|f| is all but linear in a (More & Sorensen 1983).
+    """
+    if r == 0.0:
+        return 0.0, 0.0
+    a, p, q = 0.0, f, g
+    for _ in range(3):
+        length = math.sqrt(p * p + q * q)
+        u, v = applied(p, q, xx, xy, yy)
+        u, v = shifted(u, v, xx, xy, yy, a)
+        a += (1.0 / r - 1.0 / length) * length * length * length / (p * u + q * v)
+        p, q = shifted(f, g, xx, xy, yy, a)
+    share = r / math.sqrt(p * p + q * q)
+    return share * p, share * q
+
+
+@formula
+def applied(p, q, xx, xy, yy):
+    """A (p, q)."""
+    return xx * p + xy * q, xy * p + yy * q
+
+
+@formula
+def shifted(p, q, xx, xy, yy, a):
+    """(1 + a A)^-1 (p, q)."""
+    x, y, z = 1.0 + a * xx, a * xy, 1.0 + a * yy
+    s = 1.0 / (x * z - y * y)
+    return (z * p - y * q) * s, (x * q - y * p) * s
+
+
+@formula
+def grip(friction, f, g, p, q, uu, uv, vv, static, dynamic):
     """The impulse across in two directions, (f, g) so far, that takes back the slide (p, q) as far as friction holds.
 
-    uu, uv, vv: inverse of the responses across, its least eigenvalue; static, dynamic: as much as friction can hold.
-
-    What sticks needs that inverse. Where it slides, friction f shall oppose the slide s itself: f <- f - s/k, cut to the
-    cone, ends with f along -s for a number k, as it would not for a matrix; k is the responses' greatest eigenvalue, so that
-    no step goes too far.
+    uu, uv, vv: inverse of the responses across; static, dynamic: as much as friction can hold. All of the slide is taken
+    back within the static cone; else as much as dynamic friction has, against the slide that remains.
     """
     if friction is None:
         return 0.0, 0.0
     x, y = f - (uu * p + uv * q), g - (uv * p + vv * q)
-    if x * x + y * y > static * static:             # it slides
-        x, y = f - least * p, g - least * q
-        length = math.sqrt(x * x + y * y)
-        share = min(1.0, dynamic / length) if length > 0.0 else 0.0
-        x, y = share * x, share * y
+    length = math.sqrt(x * x + y * y)
+    if length > static:
+        x, y = sliding(x, y, uu, uv, vv, min(dynamic, length))
     return x, y
 
 
@@ -420,7 +443,7 @@ def rebound(friction, rigid, touches):
                     push = given[t, 0] + total
                     px, py, pz, qx, qy, qz = line[t, 12], line[t, 13], line[t, 14], line[t, 15], line[t, 16], line[t, 17]
                     f, g = grip(friction, given[t, 1], given[t, 2], px * sx + py * sy + pz * sz, qx * sx + qy * sy + qz * sz,
-                                answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 9], answer[t, 2] * push, answer[t, 3] * push)
+                                answer[t, 5], answer[t, 6], answer[t, 7], answer[t, 2] * push, answer[t, 3] * push)
                     df, dg = f - given[t, 1], g - given[t, 2]
                     given[t, 1], given[t, 2] = f, g
                     jx, jy, jz = jx + df * px + dg * qx, jy + df * py + dg * qy, jz + df * pz + dg * qz
