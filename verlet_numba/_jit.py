@@ -4,6 +4,9 @@ Strict arithmetic: no fast-math flag at all. A fused multiply-add or a reassocia
 vectorised loop body, in its scalar remainder and on another processor. Without them a body gives the same bits alone,
 as one lane among a thousand, and on every machine; it costs nothing where division and square root are the bound.
 
+No reference counts (`_nrt`): kernels allocate nothing and hand out no array of their own, so the buffers' owner, who calls
+them, keeps all alive. Counting would take a fifth of the time of a heap, and an eighth of the time of compiling it.
+
 Numba's disk cache checks the file of the cached function only: an edited callee in another file would be served stale.
 So the cache folder is named after everything that the machine code depends on: all sources of this package, Numba,
 NumPy and the processor. An edit anywhere gives a new folder.
@@ -25,7 +28,8 @@ import numpy as np
 config: Any = numba.config
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True}
+FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,
+                         "_nrt": False}
 FOLDERS_KEPT = 4
 OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 

@@ -12,10 +12,12 @@ from verlet_numba.run.engine import run_chunk
 from verlet_numba.scene.build import frames
 
 OCCURS = {
-    "pressure": {"wind"}, "drag": {"drag"}, "damped": {"damping"}, "along": {"carried", "moving"}, "surface": {"contact"},
-    "gather_hulls": {"hulls", "points"}, "refresh": {"meet"}, "collide": {"meet", "mixed"}, "list_pairs": {"spheres"},
-    "list_against": {"mixed"}, "update_layered": {"spheres", "mixed"}, "inverse_symmetric": {"rigid"}, "sort_islands": {"touches"},
-    "share_of": {"features"}, "held": {"friction"}, "impact": {"restitution"}, "sort_bodies": {"graph"}, "remember": {"collided"}}
+    "wind.pressure": {"wind"}, "resistance.drag": {"drag"}, "resistance.damped": {"damping"}, "motion.along": {"carried", "moving"},
+    "contact.surface": {"contact"}, "narrow.gather_hulls": {"hulls", "points"}, "candidates.refresh": {"meet"},
+    "narrow.collide": {"meet", "mixed"}, "sphere_tree.list_pairs": {"spheres"}, "sphere_tree.list_against": {"mixed"},
+    "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
+    "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
+    "relax_graph.sort_bodies": {"graph", "collided"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution"))
@@ -43,17 +45,19 @@ SCENES = {
 
 
 def functions(model):
-    """Functions of the package in the frame loop of a model, inlined ones too: each leaves its environment behind."""
+    """Functions in the frame loop of a model as module.function, inlined ones too: each leaves its environment behind."""
     chunk = frames(model, 0)
     run_chunk(model, chunk)
     overload = advance.overloads[typeof(model.world), typeof(chunk), typeof(1)]
     text = str(overload.library._get_module_for_linking())      # the public inspect_llvm is empty for cached code
     found = set()
     for mangled in re.findall(r"NumbaEnv[\w$.]*?12verlet_numba([\w$.]*)", text):
+        names = []
         while (length := re.match(r"\d+", mangled)):
             end = length.end() + int(length.group())
-            name, mangled = mangled[length.end():end], mangled[end:]
-        found.add(name)
+            names.append(mangled[length.end():end])
+            mangled = mangled[end:]
+        found.add(".".join(names[-2:]))
     return found
 
 
@@ -71,7 +75,7 @@ def test_world_holds_only_what_is_called_for(name):
 def test_frame_loop_holds_only_what_is_called_for(name):
     scene, wanted = SCENES[name]
     found = functions(worlds.built(scene))
-    assert {"relax_runs", "relax_angles", "observe"} <= found
+    assert {"relax.relax_runs", "relax_angles.relax_angles", "observe.observe"} <= found
     if name == "paper":
         wanted = wanted | {"graph", "collided"}
     expected = {function for function, any_of in OCCURS.items() if any_of & wanted}

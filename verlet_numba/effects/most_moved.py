@@ -1,6 +1,7 @@
 """Which particle of a rigid body a collision has moved most: its list orders the body's relaxation (paper, 6.2)."""
 
 from verlet_numba._jit import kernel
+from verlet_numba.kernels.copying import copy_points
 from verlet_numba.kernels.relax_graph import sort_bodies
 
 
@@ -9,10 +10,7 @@ def note_places(position, collided):
     """Where the particles are before they are separated."""
     if collided is None:
         return
-    for axis in range(3):
-        now, before = position[axis], collided.before[axis]
-        for k in range(now.size):
-            before[k] = now[k]
+    copy_points(position, collided.before)
 
 
 @kernel

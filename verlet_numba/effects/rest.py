@@ -19,6 +19,7 @@ A second of 1,000 icosahedra on a floor, 480 substeps, takes 1.15 s awake and 0.
 from verlet_numba._jit import formula, kernel
 from verlet_numba.buffers import FIXED, HUNG, RESTLESS
 from verlet_numba.effects.meet import distance_of
+from verlet_numba.kernels.copying import copy
 from verlet_numba.kernels.islands import root_of
 from verlet_numba.physics.verlet import verlet
 
@@ -28,7 +29,10 @@ def at_rest(rest):
     """The number of bodies at rest."""
     if rest is None:
         return 0
-    return rest.resting.sum()
+    resting, count = rest.resting, 0
+    for b in range(resting.size):
+        count += resting[b]
+    return count
 
 
 @kernel
@@ -177,7 +181,7 @@ def lie_down(position, previous, number, rest):
     resting, slow, since, island, depth = rest.resting, rest.slow, rest.since, rest.island, rest.depth
     ax, ay, az = rest.anchor[0], rest.anchor[1], rest.anchor[2]
     parent, backed, least = rest.parent, rest.backed, rest.least
-    least[:] = slow
+    copy(slow, least, kind.size)
     for b in range(kind.size):
         r = root_of(parent, b)
         least[r], backed[r] = min(least[r], slow[b]), max(backed[r], backed[b])

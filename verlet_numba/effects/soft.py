@@ -6,6 +6,7 @@ corner that GJK finds, where the paper tests whether the leaf's centre is inside
 
 from verlet_numba._jit import kernel
 from verlet_numba.kernels.candidates import carry, replace
+from verlet_numba.kernels.copying import copy_points
 from verlet_numba.kernels.narrow import collide
 from verlet_numba.kernels.sphere_candidates import find_spheres, travelled
 from verlet_numba.kernels.sphere_tree import expire, list_against, update_layered
@@ -34,7 +35,7 @@ def find_mixed(position, hulls, trees, mixed):
         sort_pairs(candidates, mixed.hull, mixed.begin, mixed.spare)
         carry(hulls.centre, mixed.pairs, mixed.spare, mixed.pairs.listed[0], candidates.listed[0])
         replace(mixed.pairs, mixed.spare, candidates.listed[0])
-        mixed.at[:] = position
+        copy_points(position, mixed.at)
     return collide(hulls, mixed.pairs, mixed.meetings, mixed.narrow, mixed.near, mixed.coherent)
 
 

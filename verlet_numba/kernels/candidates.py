@@ -16,6 +16,7 @@ import math
 
 from verlet_numba._jit import formula, kernel
 from verlet_numba.kernels import broad
+from verlet_numba.kernels.copying import copy, copy_points
 
 NEVER = -2              # Pairs.met before any substep
 KEPT, RENEWED, FULL = 0, 1, 2
@@ -46,8 +47,7 @@ def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
     carry(centre, pairs, spare, pairs.listed[0], listed)
     replace(pairs, spare, listed)
     give_room(search.extent, hulls.reach, centre, before, still, 0.0, horizon, known)
-    for row in range(3):
-        copy(centre[row], search.anchor[row], hulls.reach.size)
+    copy_points(centre, search.anchor)
     search.turn[0] = 1 - turn
     search.made[0] += 1
     return RENEWED
@@ -123,10 +123,3 @@ def replace(pairs, spare, listed):
         copy(spare.axis[row], pairs.axis[row], listed)
     for row in range(6):
         copy(spare.face[row], pairs.face[row], listed)
-
-
-@kernel
-def copy(source, target, size):
-    """Copy the first entries."""
-    for k in range(size):
-        target[k] = source[k]

@@ -51,7 +51,7 @@ def relax_graph(position, graph, tolerance, approximate):
             place, own = order[:, begin:min(begin + lanes[d], start[d + 1])]
             width = -(-place.size // VECTOR) * VECTOR
             pack(position, place, stride[d], particles[d], width, packed)
-            wanted = (own[0] if own.min() == own.max() else -1, width)
+            wanted = (common(own), width)
             if wanted != laid_out or wanted[0] < 0:
                 lay_out(rest, own, shares.shape[1], width, lengths)
                 laid_out = wanted
@@ -61,6 +61,15 @@ def relax_graph(position, graph, tolerance, approximate):
                 relaxed += relax_tolerant_list(packed, lengths, width, entries, joins, shares, tolerance, approximate)
             unpack(position, place, stride[d], particles[d], width, packed)
     return relaxed
+
+
+@kernel
+def common(own):
+    """The number that all of own (N,) are, -1 if they differ."""
+    for k in range(own.size):
+        if own[k] != own[0]:
+            return -1
+    return own[0]
 
 
 @kernel

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import kernel
+from verlet_numba.kernels.copying import copy_points
 from verlet_numba.kernels.sphere_tree import list_pairs, update_layered
 
 
@@ -28,7 +29,7 @@ def find_spheres(position, inverse_mass, layered, itself, stack, spheres):
     update_layered(position, layered)
     if not list_pairs(layered, inverse_mass, spheres.margin, itself, stack, candidates):
         return False
-    spheres.at[:] = position
+    copy_points(position, spheres.at)
     return True
 
 
