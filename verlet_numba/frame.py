@@ -128,7 +128,7 @@ def advance(world, frames, budget):
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
                 aim_hulls(mixed, points, contact, rigid, touches, MIXED, clock[NUMBER], h)
                 respond(friction, rigid, touches)
-                begin_pass(again, rigid, touches)
+                begin_pass(again, friction, rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)
                 if not again:

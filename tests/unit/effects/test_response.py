@@ -67,7 +67,7 @@ class Case:
 
     def solved(self):
         """The particles are displaced by what the touches give."""
-        begin_pass(0, self.rigid, self.touches)
+        begin_pass(0, self.effects.friction, self.rigid, self.touches)
         shove(self.effects.friction, self.rigid, self.touches)
         displace(self.x, self.w, self.rigid)
         return self
