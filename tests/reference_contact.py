@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import brentq
 
-from verlet_numba.effects.response import RECOVERY, SETTLED, SHARE, SWEEPS
+from verlet_numba.effects.response import RECOVERY, SETTLED, SHARE, SMALL, SWEEPS
 
 
 def turned(axis, angle):
@@ -197,7 +197,7 @@ class Whole:
         self.met[k] = twin.number
         if contact.recalled == 0:
             return -gap - self.overlap[k]
-        later = (1 - SHARE) * error
+        later = np.clip((1 - SHARE) * error, -SMALL * self.size, SMALL * self.size)
         return -gap - (max(self.overlap[k], later) if error > 0 else later)
 
     def strike(self, contact, impulse):

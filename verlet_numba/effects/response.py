@@ -20,7 +20,8 @@ SWEEPS = 48                 # over an island, at most
 FEW_SWEEPS = 4              # over an island of more touches than
 FEW_TOUCHES = 128           # these: what they leave, the next substep takes up
 SETTLED = 1e-7              # of the largest impulse: a sweep that changes less is the last
-SHARE = 0.2                 # of what a gap is off: what touches that go on pushing correct in a substep
+SHARE = 0.2                 # of what a gap is off: what touches that go on pushing correct in a substep, or all but
+SMALL = 1e-3                # of the size of the smaller
 RECOVERY = 2.5              # 1/s: an overlap in which two meet is given back at this many sizes of the smaller a second
 
 
@@ -49,7 +50,7 @@ def aim_colliders(position, contact, rigid, touches, number, h):
         standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
         overlap[k] = still_given(overlap[k], met[k], number, max(0.0, standing), RECOVERY * reach[e] * h)
         met[k] = number
-        answer[t, 0] = -gap - left_for_later(standing, overlap[k], recalled[t, 0])
+        answer[t, 0] = -gap - left_for_later(standing, overlap[k], recalled[t, 0], SMALL * reach[e])
 
 
 @inlined
@@ -62,19 +63,19 @@ def still_given(overlap, met, number, standing, rate):
 
 
 @inlined
-def left_for_later(standing, overlap, push):
+def left_for_later(standing, overlap, push, most):
     """Which part of what a gap was off at the substep's start stays [m]; standing: positive where they overlapped.
 
-    A touch that begins with the push of the last substep corrects a SHARE, of an overlap and of a gap alike. Else that push
-    would be the sum of all errors so far: with the gap x, its speed v and the push e beyond what is needed, a mode of an
-    island of which the sweeps solve the part k in a substep goes as
+    A touch that begins with the push of the last substep corrects a SHARE, of an overlap and of a gap alike, or all but `most`
+    of it. Else that push would be the sum of all errors so far: with the gap x, its speed v and the push e beyond what is
+    needed, a mode of an island of which the sweeps solve the part k in a substep goes as
         e' = -k (SHARE x + v + e),  v' = e,  x' = v  a substep,  so  s^3 + k s^2 + k s + k SHARE = 0,
     which dies away only if k > SHARE (Routh). Of a large heap, whose softest modes have a small k, contacts would open and
     close for ever.
     """
     left = overlap
     if push > 0.0:
-        rest = (1.0 - SHARE) * standing
+        rest = max(-most, min((1.0 - SHARE) * standing, most))
         left = rest if standing < 0.0 else max(overlap, rest)
     return left
 
@@ -127,7 +128,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
         overlap[p] = still_given(overlap[p], met[p], number, max(0.0, standing), RECOVERY * size * h)
         met[p] = number
-        answer[t, 0] = -gap - left_for_later(standing, overlap[p], recalled[t, 0])
+        answer[t, 0] = -gap - left_for_later(standing, overlap[p], recalled[t, 0], SMALL * size)
 
 
 @inlined

@@ -213,9 +213,11 @@ def test_what_is_left_of_an_overlap(overlap, met, standing, left):
 
 @pytest.mark.parametrize(("standing", "overlap", "push", "left"), [
     (0.5, 0.0, 0.0, 0.0), (0.5, 0.4, 0.0, 0.4), (-0.5, 0.0, 0.0, 0.0), (0.5, 0.0, 1.0, 0.5 * (1 - SHARE)), (0.5, 0.45, 1.0, 0.45),
-    (-0.5, 0.0, 1.0, -0.5 * (1 - SHARE))], ids=["met anew", "overlapped then", "closes", "pushes on", "is slower still", "is open"])
+    (-0.5, 0.0, 1.0, -0.5 * (1 - SHARE)),
+    (9.0, 0.0, 1.0, 0.6), (-9.0, 0.0, 1.0, -0.6), (9.0, 0.7, 1.0, 0.7)],
+    ids=["met anew", "overlapped then", "closes", "pushes on", "is slower still", "is open", "is deep", "is wide", "is both"])
 def test_what_is_left_of_a_gaps_error(standing, overlap, push, left):
-    assert left_for_later(standing, overlap, push) == pytest.approx(left)
+    assert left_for_later(standing, overlap, push, 0.6) == pytest.approx(left)
 
 
 def test_a_substep_begins_with_what_every_contact_gave_in_the_last():
