@@ -154,6 +154,18 @@ def test_a_pancake_that_grazes_does_not_fall_through(simulate):
     assert run.measures["constraint_error_max"].max() < 0.05
 
 
+# --- Contacts counted -------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("bodies", "count"), [
+    ([box("crate", [0, 0, 0.2])], 4), ([box("crate", [0, 0, 0.2]), box("other", [2, 0, 0.2])], 8),
+    ([box("low", [0, 0, 0.2], fixed=True), box("high", [0, 0, 0.6])], 4),
+    ([box("hinged", [0, 0, 0.2], pinned=[0, 2])], 1)], ids=["on the floor", "two", "on another", "hinged"])
+def test_every_corner_that_something_stands_on_is_a_contact(simulate, bodies, count):
+    """Once, be it on the floor or on another body; of a body that hangs on a hinge one corner takes all."""
+    contacts = simulate(scene(bodies, 0.5)).measures["contacts"]
+    assert (contacts[10:] == count).all()
+
+
 # --- Collisions in flight ---------------------------------------------------------------------------------------------
 
 def duel(offset=0.15):

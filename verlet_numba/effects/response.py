@@ -46,17 +46,19 @@ def aim_colliders(position, contact, rigid, touches, number, h):
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
         standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
-        overlap[k] = still_given(overlap[k], met[k], number, standing, RECOVERY * reach[e] * h)
+        overlap[k] = min(still_given(overlap[k], met[k], number, RECOVERY * reach[e] * h), standing)
         met[k] = number
         answer[t, 0] = -gap - overlap[k]
 
 
 @inlined
-def still_given(overlap, met, number, standing, rate):
-    """What an overlap that two had when they met may still be, having shrunk by `rate` [m] a substep: 0 for all that met apart."""
-    left = standing
-    if met >= number - 1:
-        left = min(max(0.0, overlap - rate if met < number else overlap), standing)
+def still_given(overlap, met, number, rate):
+    """What an overlap that two had when they met may still be, shrinking by `rate` [m] a substep: anything as they meet."""
+    left = math.inf
+    if met == number:
+        left = overlap
+    elif met == number - 1:
+        left = max(0.0, overlap - rate)
     return left
 
 
@@ -65,7 +67,8 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     """Lines and wishes of the touches between hulls, from the corners where they are.
 
     Two bodies push each other midway between the points of theirs that touch: with equal and opposite impulses at one point
-    angular momentum is kept, whatever they overlap by.
+    angular momentum is kept, whatever they overlap by. The deepest of a pair's contacts, which stand side by side, is its
+    overlap: so contacts are aimed the same again, however often.
     """
     if meet is None or rigid is None:
         return
@@ -76,7 +79,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
     mass, step, moved, kick, reach = rigid.mass, rigid.step, rigid.moved, rigid.kick, rigid.reach
     overlap, met = meet.pairs.overlap, meet.pairs.met
-    world = reach.size - 1
+    world, last, left = reach.size - 1, -1, 0.0
     for t in range(touches.until[which - 1], touches.until[which]):
         m, a, b = source[t], first[t], second[t]
         g, q = one[pair[m]], other[pair[m]]
@@ -105,10 +108,12 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         p = pair[m]
+        if p != last:
+            last, left = p, still_given(overlap[p], met[p], number, RECOVERY * size * h)
+            overlap[p], met[p] = 0.0, number
         standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
-        overlap[p] = still_given(overlap[p], met[p], number, standing, RECOVERY * size * h)
-        met[p] = number
-        answer[t, 0] = -gap - overlap[p]
+        answer[t, 0] = -gap - min(left, standing)
+        overlap[p] = max(overlap[p], min(left, standing))
 
 
 @inlined
