@@ -195,7 +195,7 @@ def test_angular_momentum_is_kept_to_first_order(simulate):
     A push moves bodies from where they are at the end of a step, and its speed counts from where they were at its start.
     """
     substeps = np.array([8, 16, 32, 64, 128])
-    lost, push = np.array([angular_momentum_lost(simulate, n) for n in substeps]).T
+    lost, push = np.array([angular_momentum_lost(simulate, n) for n in substeps.tolist()]).T
     assert (lost * 60 * substeps < 4 * push).all()
     assert np.polyfit(np.log(substeps), np.log(lost), 1)[0] == pytest.approx(-1, abs=0.25)
 
