@@ -1,6 +1,7 @@
 """Small scenes as running worlds, for tests of every part of the simulator."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 
@@ -15,7 +16,7 @@ APART = {
     "solver": {"substeps": 4, "iterations": 2},
     "effects": {"gravity": [0.5, 0, -9.81], "drag": {"linear": 0.3, "quadratic": 0.2}, "damping": 0.4,
                 "wind": {"velocity": [2, 1, 0.5], "density": 1.2}, "friction": {"static": 0.5, "dynamic": 0.3},
-                "restitution": 0.1, "self_collision": True},
+                "restitution": 0.1, "self_collision": True, "rest": {"time": 10}},
     "bodies": [
         {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 3], "mass": 0.2, "thickness": 0.04,
          "position": [0, 0, 0.7], "rotation": {"axis": [1, 2, 0], "degrees": 10}, "velocity": [0.3, 0, -2]},
@@ -35,11 +36,12 @@ APART = {
         {"kind": "sphere", "radius": 0.3, "position": [0, 0, 0.3], "spin": {"axis": [0, 1, 1], "rate": 4},
          "path": [[0, 0, 0, 0], [0.1, 0, 0, 0.1], [0.3, 0.1, 0, 0]]},
         {"kind": "box", "size": [0.4, 0.3, 0.2], "position": [-0.5, -0.6, 0.1], "friction": 0.9, "restitution": 0.4},
-        {"kind": "cylinder", "radius": 0.15, "axis": [1, 1, 0.2], "length": 0.8, "position": [0.5, -0.6, 0.2]}],
+        {"kind": "cylinder", "radius": 0.15, "axis": [1, 1, 0.2], "length": 0.8, "position": [0.5, -0.6, 0.2]},
+        {"kind": "mesh", "file": str(Path(__file__).with_name("sheet.obj")), "position": [90, 0, 0]}],
     "output": {"fields": ["velocity"], "precision": "float64"}}
 """Calls for every effect, in every kind of constraint: copies and cloth in runs, single bodies in sticks, angles.
 
-Its bodies meet colliders, rigid ones the room alone, and each other only later.
+Its bodies meet colliders, rigid ones the room alone, and each other only later. Nothing reaches the mesh, nor rests so long.
 """
 
 EVERYTHING = APART | {"bodies": [

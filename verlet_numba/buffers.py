@@ -363,7 +363,7 @@ class Layered(NamedTuple):
     lattice: Array              # (T, 4) double m; spacing along i, along j, closest pair at rest that may meet, contact radius
     radius: Array               # (n,) real m; contact radius
     apart: Array                # (n + 1,) int 1; particle p never meets partner[apart[p]:apart[p + 1]]
-    partner: Array              # (X,) int 1; in ascending order
+    partner: Array              # (X,) int 1; in ascending order, hulls numbered from n on
 
 
 class Wrapped(NamedTuple):

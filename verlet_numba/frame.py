@@ -71,7 +71,7 @@ def advance(world, frames, budget):
                 if clock[SUBSTEP] == substeps - 1:
                     contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
                     keep(position, previous, snapshot, contacts)
-                settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, touches, features)
+                settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
                 if idle(rest, moving):                                      # all bodies rest: no work
                     clock[NUMBER] += 1
                     clock[SUBSTEP] += 1
@@ -93,9 +93,11 @@ def advance(world, frames, budget):
                         and find_meetings(hulls, meet, rest)
                         and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
                     return FULL
-                if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, moving):
+                if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, points, mixed,
+                            moving):
                     break
                 gather(position, hulls)
+                gather(position, points)
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)

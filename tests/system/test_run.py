@@ -56,7 +56,7 @@ def test_every_path_of_the_contract(found):
              **{f"bodies/{name}": ((BODIES,), None)
                 for name in ("name", "kind", "first_particle", "particles", "first_face", "faces", "mass")},
              **{f"provenance/{name}": ((), None) for name in (
-                 "scene_text", "scene", "command", "seed", "versions", "cpu", "start", "end", "timing", "status")}}
+                 "scene_text", "folder", "scene", "command", "seed", "versions", "cpu", "start", "end", "timing", "status")}}
     for path, (shape, dtype) in cases.items():
         assert found[path].shape == shape, path
         assert dtype is None or found[path].dtype == dtype, path
@@ -137,6 +137,7 @@ def test_what_happens_is_physical(found):
 
 def test_provenance_is_enough_to_repeat_the_run(found, mixed):
     text = {name: found[f"provenance/{name}"].item() for name in ("scene_text", "scene", "command", "versions", "status")}
+    assert found["provenance/folder"].item().decode() == str(mixed.scene.parent.resolve())
     assert text["scene_text"].decode() == mixed.scene.read_text(encoding="utf-8")
     scene = json.loads(text["scene"])
     assert scene["effects"]["gravity"] == [0, 0, -9.81]

@@ -17,12 +17,12 @@ OCCURS = {
     "narrow.collide": {"meet", "mixed"}, "sphere_tree.list_pairs": {"spheres"}, "sphere_tree.list_against": {"mixed"},
     "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
-    "relax_graph.sort_bodies": {"graph", "collided"}}
+    "relax_graph.sort_bodies": {"graph", "collided"}, "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
-CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution"))
+CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
 STILL = [{key: value for key, value in collider.items() if key not in ("path", "spin", "friction", "restitution")}
-         for collider in worlds.EVERYTHING["colliders"]]
+         for collider in worlds.EVERYTHING["colliders"] if collider["kind"] != "mesh"]
 BARE = [{key: value for key, value in body.items() if key not in ("path", "pinned", "friction", "restitution")}
         for body in worlds.EVERYTHING["bodies"]]
 RIGID = [{key: value for key, value in worlds.CRATE.items() if key != "friction"}]
@@ -30,10 +30,9 @@ SOFT = {"trees", "spheres"}
 MIX = {*SOFT, "points", "mixed"}
 MEET = {"hulls", "meet"}
 WHOLE = {"rigid", "touches"}
-ELSEWHERE = {"meshes", "rest"}          # scenes of their own, in their own tests
 SCENES = {
-    "everything": (worlds.EVERYTHING, EFFECTS - {"features"} - ELSEWHERE),
-    "paper": (worlds.PAPER, EFFECTS - WHOLE - ELSEWHERE),
+    "everything": (worlds.EVERYTHING, EFFECTS - {"features"}),
+    "paper": (worlds.PAPER, EFFECTS - WHOLE),
     "colliders at rest": (worlds.with_changes(worlds.EVERYTHING, effects=CALM, bodies=BARE, colliders=STILL, output={"fields": []}),
                           {"gravity", "contact", *MEET, *MIX, *WHOLE}),
     "a crate on the floor": (worlds.FREE | {"bodies": [*worlds.FREE["bodies"][1:], *RIGID], "colliders": [{"kind": "plane"}],
@@ -84,7 +83,7 @@ def test_frame_loop_holds_only_what_is_called_for(name):
 
 def test_every_effect_leaves_a_trace():
     """Else the tests above would not look at it. Trees come with what they are for; gravity has no function."""
-    assert {effect for effects in OCCURS.values() for effect in effects} >= EFFECTS - {"gravity", "trees"} - ELSEWHERE
+    assert {effect for effects in OCCURS.values() for effect in effects} >= EFFECTS - {"gravity", "trees"}
 
 
 def test_nothing_accelerates_without_an_effect_that_does():

@@ -33,7 +33,7 @@ def test_every_frame_is_that_of_the_twin(twin):
 def test_the_scene_of_the_twin_calls_for_everything(twin):
     """Else the test above could not fail."""
     effects = worlds.built(worlds.APART).world.effects._asdict()
-    assert [name for name, effect in effects.items() if effect is None] == ["meshes", "features", "rest"]
+    assert [name for name, effect in effects.items() if effect is None] == ["features"]
     assert twin[2]["contacts"].sum() >= 25
     assert twin[2]["penetration_max"].max() > 1e-4
 

@@ -50,7 +50,8 @@ def test_a_woken_stack_goes_on_as_if_it_had_never_rested():
     awaken(rested)
     position, _, measures = worlds.advanced(rested, 40)
     assert (measures[:, RESTING] == 0).all()
-    np.testing.assert_array_equal(position[1:, :24], expected[slept + 1:slept + 40])
+    # pairs at rest that wake are looked at once where they rest, and may then know the same contact by another face
+    np.testing.assert_allclose(position[1:, :24], expected[slept + 1:slept + 40], rtol=0, atol=1e-13)
 
 
 def test_nothing_rests_in_mid_air():

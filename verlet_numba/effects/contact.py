@@ -175,10 +175,10 @@ def penetration(position, inverse_mass, contact):
 
 @kernel
 def touching(contact):
-    """The number of contacts that have pushed in this substep."""
+    """The number of contacts that have pushed in this substep; those of bodies that answer as a whole are touches."""
     if contact is None:
         return 0
-    push, pushed = contact.push, 0
+    particle, body, push, pushed = contact.particle, contact.body, contact.push, 0
     for c in range(contact.listed[0]):
-        pushed += push[c] > 0.0
+        pushed += body[particle[c]] < 0 and push[c] > 0.0
     return pushed

@@ -97,7 +97,7 @@ def distance_of(x, y, z, corners, particle, corner, weight, normal, m):
 
 @kernel
 def pushing(touches, features, meet, mixed):
-    """The number of contacts of hulls and of rigid bodies that have pushed in this substep."""
+    """The number of contacts of hulls, and of rigid bodies with colliders, that have pushed in this substep."""
     return pushing_touches(touches) + pushing_features(features, meet) + pushing_features(features, mixed)
 
 
@@ -106,7 +106,7 @@ def pushing_touches(touches):
     if touches is None:
         return 0
     pushed = 0
-    for t in range(touches.until[0], touches.until[-1]):        # those with colliders count as contacts
+    for t in range(touches.until[-1]):
         pushed += touches.given[t, 0] > 0.0
     return pushed
 

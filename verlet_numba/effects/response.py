@@ -48,17 +48,19 @@ def aim_colliders(position, contact, rigid, touches, number, h):
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
         standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
-        overlap[k] = still_given(overlap[k], met[k], number, max(0.0, standing), RECOVERY * reach[e] * h)
+        overlap[k] = min(still_given(overlap[k], met[k], number, RECOVERY * reach[e] * h), max(0.0, standing))
         met[k] = number
         answer[t, 0] = -gap - left_for_later(standing, overlap[k], recalled[t, 0], SMALL * reach[e])
 
 
 @inlined
-def still_given(overlap, met, number, standing, rate):
-    """What an overlap that two had when they met may still be, having shrunk by `rate` [m] a substep: 0 for all that met apart."""
-    left = standing
-    if met >= number - 1:
-        left = min(max(0.0, overlap - rate if met < number else overlap), standing)
+def still_given(overlap, met, number, rate):
+    """What an overlap that two had when they met may still be, shrinking by `rate` [m] a substep: anything as they meet."""
+    left = math.inf
+    if met == number:
+        left = overlap
+    elif met == number - 1:
+        left = max(0.0, overlap - rate)
     return left
 
 
@@ -85,7 +87,8 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     """Lines and wishes of the touches between hulls, from the corners where they are.
 
     Two bodies push each other midway between the points of theirs that touch: with equal and opposite impulses at one point
-    angular momentum is kept, whatever they overlap by.
+    angular momentum is kept, whatever they overlap by. The deepest of a pair's contacts, which stand side by side, is its
+    overlap: so contacts are aimed the same again, however often.
     """
     if meet is None or rigid is None:
         return
@@ -96,7 +99,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
     mass, step, moved, kick, reach = rigid.mass, rigid.step, rigid.moved, rigid.kick, rigid.reach
     overlap, met, recalled = meet.pairs.overlap, meet.pairs.met, touches.recalled
-    world = reach.size - 1
+    world, last, left = reach.size - 1, -1, 0.0
     for t in range(touches.until[which - 1], touches.until[which]):
         m, a, b = source[t], first[t], second[t]
         g, q = one[pair[m]], other[pair[m]]
@@ -125,10 +128,13 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         p = pair[m]
+        if p != last:
+            last, left = p, still_given(overlap[p], met[p], number, RECOVERY * size * h)
+            overlap[p], met[p] = 0.0, number
         standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
-        overlap[p] = still_given(overlap[p], met[p], number, max(0.0, standing), RECOVERY * size * h)
-        met[p] = number
-        answer[t, 0] = -gap - left_for_later(standing, overlap[p], recalled[t, 0], SMALL * size)
+        own = min(left, max(0.0, standing))
+        answer[t, 0] = -gap - left_for_later(standing, own, recalled[t, 0], SMALL * size)
+        overlap[p] = max(overlap[p], own)
 
 
 @inlined

@@ -76,6 +76,15 @@ def overlap(ax, ay, az, a, bx, by, bz, b, margin):
     return x * x + y * y + z * z < reach * reach
 
 
+@inlined
+def never(apart, partner, p, q):
+    """Whether particle p never meets q: a particle, or a rigid leaf numbered after all particles."""
+    found = False
+    for m in range(apart[p], apart[p + 1]):
+        found |= partner[m] == q
+    return found
+
+
 @kernel
 def list_pairs(layered, inverse_mass, margin, itself, stack, candidates):
     """List the pairs of particles nearer than the margin, of any two trees and, if `itself`, of each against itself (P17).
@@ -133,10 +142,7 @@ def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, rat
             continue
         p, q, r, s = particle[k], particle[l], row[k], row[l]
         if p >= 0 and q >= 0:
-            never = False
-            for m in range(apart[p], apart[p + 1]):
-                never |= partner[m] == q
-            if never or not inverse_mass[p] + inverse_mass[q] > 0.0:
+            if never(apart, partner, p, q) or not inverse_mass[p] + inverse_mass[q] > 0.0:
                 continue
             if listed == one.size:
                 return -1
@@ -186,20 +192,21 @@ def update_wrapped(points, support, sphere, k):
 def list_against(layered, points, wrapped, margin, stack, candidates):
     """List the particles of deformable bodies with the rigid leaves that they may be near (P17).
 
-    None is missed that is nearer than the margin to what the leaf's points span; all are that near to the leaf's sphere, and
-    to those above it. `points` are what the wrapped trees are about. False: no room (grow and call again).
+    None is missed that is nearer than the margin to what the leaf's points span, unless the two never meet; all are that near
+    to the leaf's sphere, and to those above it. `points` are what the wrapped trees are about. False: no room (grow and call
+    again).
     """
     if layered is None or wrapped is None:
         return True
     root, skip, particle, sphere = layered.root, layered.skip, layered.particle, layered.sphere
     roots, skips, leaf, support = wrapped.root, wrapped.skip, wrapped.leaf, wrapped.support
-    spheres, stamp, now = wrapped.sphere, wrapped.stamp, wrapped.now[0]
+    spheres, stamp, now, apart, partner = wrapped.sphere, wrapped.stamp, wrapped.now[0], layered.apart, layered.partner
     one, two, first, second = candidates.first, candidates.second, stack.first, stack.second
     listed = 0
     for t in range(root.size - 1):
         for u in range(roots.size - 1):
             listed = descend_wrapped(root[t], roots[u], skip, particle, sphere, skips, leaf, support, spheres, stamp, now, points,
-                                     margin, first, second, one, two, listed)
+                                     apart, partner, margin, first, second, one, two, listed)
             if listed < 0:
                 return False
     candidates.listed[0] = listed
@@ -207,8 +214,8 @@ def list_against(layered, points, wrapped, margin, stack, candidates):
 
 
 @kernel
-def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, spheres, stamp, now, points, margin,
-                    first, second, one, two, listed):
+def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, spheres, stamp, now, points, apart, partner,
+                    margin, first, second, one, two, listed):
     """List the pairs of a layered and a wrapped tree; the new number of pairs, -1: no room."""
     first[0], second[0], height = top, other, 1
     while height > 0:
@@ -220,6 +227,8 @@ def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, sp
         if overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
                    spheres[l, 0], spheres[l, 1], spheres[l, 2], spheres[l, 3], margin):
             if particle[k] >= 0 and leaf[l] >= 0:
+                if never(apart, partner, particle[k], apart.size - 1 + leaf[l]):
+                    continue
                 if listed == one.size:
                     return -1
                 one[listed], two[listed] = particle[k], leaf[l]

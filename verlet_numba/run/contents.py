@@ -108,7 +108,8 @@ def provenance(prepared: Prepared, model: Model, command: str) -> dict[str, str 
     """Where a file comes from: enough to make it again."""
     versions = {"verlet-numba": __version__, "format": FORMAT, "python": platform.python_version(),
                 **{name: version(name) for name in LIBRARIES}}
-    return {"scene_text": prepared.loaded.source.text, "scene": json.dumps(resolved(prepared.scene)), "command": command,
+    return {"scene_text": prepared.loaded.source.text, "folder": str(prepared.loaded.folder.resolve()),
+            "scene": json.dumps(resolved(prepared.scene)), "command": command,
             "seed": prepared.scene.seed, "versions": json.dumps(versions), "cpu": cpu(),
             "plan": json.dumps(plan(prepared, model)), "start": now()}
 

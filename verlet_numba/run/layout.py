@@ -61,7 +61,7 @@ class Contents:
     polygons: Integers                          # (F, 3) triangles
     bodies: BodyTable
     observables: dict[str, Quantity]
-    provenance: dict[str, str | int | float]    # scene_text, scene (JSON), command, seed, versions, cpu, start
+    provenance: dict[str, str | int | float]    # scene_text, folder, scene (JSON), command, seed, versions, cpu, start
     fields: tuple[str, ...] = ("position",)     # position first; velocity
     dtype: str = "f4"
     precision_bits: int = 24                    # significant bits of a stored float; 23 and less round

@@ -32,7 +32,7 @@ def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> l
     found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies)]
     if scene.effects.contact != "none":
         found += [*inside_colliders(scene, bodies, surfaces), *overlaps(scene, bodies), *selves(scene, bodies),
-                  *cramped(scene, bodies), *slipping(scene, bodies), *rebounds(scene, bodies)]
+                  *slipping(scene, bodies), *rebounds(scene, bodies)]
     found += [*resolution(scene, bodies), *lost_gravity(scene, bodies)]
     return [source.problem(path, message) for path, message in found]
 
@@ -105,25 +105,6 @@ def attachments(scene: Scene, bodies: list[Body]) -> Warnings:
         elif not any(held) and max(masses) > MASS_RATIO * min(masses):
             yield path, (f"joins masses of {max(masses) / min(masses):.3g}:1, which few passes leave apart: use more "
                          "substeps")
-
-
-def cramped(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Attached particles whose contact works against the attachment: only the two themselves are left out of it."""
-    named = {body.name: body for body in bodies}
-    for row, (a, p, b, q) in enumerate(scene.attachments):
-        for name, i, partner, j in ((a, p, b, q), (b, q, a, p)):
-            soft, body = named[name].shape, named[partner]
-            if soft.rigid or name == partner:
-                continue
-            beside = soft.sticks[(soft.sticks == i).any(axis=1)].sum(axis=1) - i
-            places = named[name].positions[0]
-            reach = soft.radius + body.shape.radius
-            if body.shape.rigid and soft.radius > 0:
-                yield ("attachments", row), (f"{name} has a thickness, by which {partner}, a rigid body, pushes the attached "
-                                             "particle away: the two pull at each other; make it 0")
-            elif (np.linalg.norm(places[beside] - body.positions.reshape(-1, 3)[j], axis=1) < reach * (1 - TOUCH)).any():
-                yield ("attachments", row), (f"the sphere of {partner} pushes the neighbours of the attached particle of {name} "
-                                             "away: the two pull at each other; make them thinner")
 
 
 def inside_colliders(scene: Scene, bodies: list[Body], surfaces: dict[int, Surface]) -> Warnings:

@@ -93,7 +93,7 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
                    points, mixed, rigid, touches, features,
                    friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
                    restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
-                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real) if mixed is None else None)
+                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real))
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,

@@ -183,8 +183,6 @@ def no_contact(prepared: Prepared, world: World) -> str:
 def rest_reason(prepared: Prepared, active: Effects) -> str:
     if prepared.scene.effects.rest is None:
         return "effects.rest is left out"
-    if active.mixed is not None:
-        return "named, but deformable bodies meet the rigid ones and keep them awake"
     return "effects.rest" if active.rest is not None else "named, but there is no rigid body that may rest on something"
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from verlet_numba.buffers import Candidates, Layered, Spheres, Stack, Wrapped, gate
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
+from verlet_numba.scene.clearance import hull_clearance
+from verlet_numba.scene.hulls import hulls_of, surface_of
 from verlet_numba.scene.numbering import Numbering
 
 INSIDE = 1 + 1e-12          # times a squared radius: what rounding may leave outside
@@ -174,7 +176,7 @@ def layered_of(bodies: list[Body], numbering: Numbering, size: int, real: Any, a
     node, rectangle, edges, ends = (np.concatenate(column) for column in zip(*patches, strict=True))
     row = np.full(len(particle), -1)
     row[node] = np.arange(len(node))
-    apart, partner = exclusions(soft, size, attached)
+    apart, partner = exclusions(bodies, numbering, size, attached)
     return Layered(root=gate(nodes, np.int64), skip=gate(np.concatenate(skips), np.int64), particle=gate(particle, np.int64),
                    leaf=gate(np.flatnonzero(particle >= 0), np.int64),
                    inner=gate(inner[np.argsort(-level[inner], kind="stable")], np.int64),
@@ -263,18 +265,53 @@ def lattice_of(shape: Shape) -> tuple[float, float, float]:
     return dx, dy, float(min([far, *distances[distances >= 2 * shape.radius]]))
 
 
-def exclusions(soft: list[tuple[Body, Integers]], size: int, attached: Integers) -> tuple[Integers, Integers]:
-    """Which particles never meet, as the rows (size + 1,) and columns of a sparse matrix.
+def exclusions(bodies: list[Body], numbering: Numbering, size: int, attached: Integers) -> tuple[Integers, Integers]:
+    """Which particles never meet, as the rows (size + 1,) and columns of a sparse matrix; columns from `size` on are hulls.
 
-    They share a stick, are attached to each other, or belong to one body and are nearer at rest than their radii reach (P22).
+    They share a stick, belong to one body and are nearer at rest than their radii reach (P22), or are so by an attachment.
     """
-    pairs = [attached.reshape(-1, 2)]
-    for body, index in soft:
-        never = np.concatenate([body.shape.sticks, near_at_rest(body.shape)])
-        pairs.append(index[:, never].reshape(-1, 2))
-    first, second = np.concatenate(pairs).T
-    both = np.unique(np.concatenate([first * size + second, second * size + first]))
-    return np.searchsorted(both, size * np.arange(size + 1)), both % size
+    pairs = [attached.reshape(-1, 2), *joined(bodies, numbering, size, attached)]
+    for body, index in zip(bodies, numbering.bodies, strict=True):
+        if not body.shape.rigid:
+            never = np.concatenate([body.shape.sticks, near_at_rest(body.shape)])
+            pairs.append(index[:, never].reshape(-1, 2))
+    found = np.concatenate(pairs)
+    here, there = np.concatenate([found, found[:, ::-1]]).T
+    width = max(size, int(there.max(initial=0)) + 1)
+    both = np.unique((here * width + there)[here < size])
+    return np.searchsorted(both, width * np.arange(size + 1)), both % width
+
+
+def joined(bodies: list[Body], numbering: Numbering, size: int, attached: Integers) -> Iterator[Integers]:
+    """Pairs (A, 2) of particles, and of particles and hulls, numbered from n on, that no motion of attached bodies parts.
+
+    Where particle i of one is held at j of another, what is at rest at r from i and at s from j is never farther apart than
+    r + s: it overlaps for ever if its radii reach that far. So do a particle and a hull that reaches to j, or beyond it.
+    """
+    hulls = np.cumsum([size, *(body.copies * len(hulls_of(body.shape)) for body in bodies)])
+    for i, j in [*attached, *attached[:, ::-1]]:
+        (a, p), (b, q) = (owner(numbering, k) for k in (i, j))
+        one, other = bodies[a].shape, bodies[b].shape
+        reach = one.radius + other.radius
+        if one.rigid or (i > j and not other.rigid):
+            continue
+        beside, own = np.linalg.norm(one.positions - one.positions[p[1]], axis=1), numbering.bodies[a][p[0]]
+        if other.rigid:
+            parts = hulls_of(other)
+            for m, hull in enumerate(parts):
+                outside = hull_clearance(*surface_of(other.positions, hull), other.positions[q[1]][None])[0]
+                never = np.flatnonzero((beside + outside < reach) | (beside == 0))
+                yield np.stack([own[never], np.full(len(never), hulls[b] + q[0] * len(parts) + m)], axis=1)
+        else:
+            beyond, its = np.linalg.norm(other.positions - other.positions[q[1]], axis=1), numbering.bodies[b][q[0]]
+            near, far = np.flatnonzero(beside < reach), np.flatnonzero(beyond < reach)
+            row, column = np.nonzero(beside[near, None] + beyond[far] < reach)
+            yield np.stack([own[near[row]], its[far[column]]], axis=1)
+
+
+def owner(numbering: Numbering, k: int) -> tuple[int, Integers]:
+    """The body that particle k belongs to, its copy and its number there."""
+    return next((b, np.argwhere(index == k)[0]) for b, index in enumerate(numbering.bodies) if (index == k).any())
 
 
 def near_at_rest(shape: Shape) -> Integers:

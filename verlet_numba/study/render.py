@@ -82,7 +82,8 @@ class View:
     def __init__(self, trajectory: Trajectory, width: int, height: int) -> None:
         self.trajectory = trajectory
         self.colliders = [entry for entry in trajectory.scene.get("colliders") or () if isinstance(entry, dict)]
-        self.solids = [solid(collider, trajectory.path.parent) for collider in self.colliders]
+        folders = Path(trajectory.provenance.get("folder", "")), trajectory.path.parent      # of the scene when it ran; moved since
+        self.solids = [solid(collider, folders) for collider in self.colliders]
         self.light = LIGHT / np.linalg.norm(LIGHT)
         shown = choose(trajectory, None, FRAMED)
         points = trajectory.positions(shown).astype(float).reshape(-1, 3)

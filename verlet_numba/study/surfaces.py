@@ -1,5 +1,6 @@
 """Bodies and colliders as coloured triangles, for pictures."""
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import combinations
 from pathlib import Path
@@ -138,8 +139,11 @@ def placed(collider: dict[str, Any], time: float) -> Placed:
     return Placed(origin + moved, rotation)
 
 
-def solid(collider: dict[str, Any], folder: Path) -> Floats:
-    """Triangles (M, 3, 3) of a box, sphere, cylinder or mesh collider about its own origin; none for other kinds."""
+def solid(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
+    """Triangles (M, 3, 3) of a box, sphere, cylinder or mesh collider about its own origin; none for other kinds.
+
+    A mesh's file is in the first of the folders that has it.
+    """
     match collider["kind"]:
         case "box":
             half = 0.5 * np.array(collider["size"], float)
@@ -159,16 +163,17 @@ def solid(collider: dict[str, Any], folder: Path) -> Floats:
                     for corner, lid in ((0, -end), (1, end))]
             return np.concatenate([tube, *lids])
         case "mesh":
-            return _mesh(collider, folder)
+            return _mesh(collider, folders)
     return np.zeros((0, 3, 3))
 
 
-def _mesh(collider: dict[str, Any], folder: Path) -> Floats:
+def _mesh(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
     """A mesh collider's triangles; none if its file is gone."""
     import trimesh
 
+    files = [folder / collider["file"] for folder in folders]
     try:
-        mesh = trimesh.load_mesh(folder / collider["file"], process=False)
+        mesh = trimesh.load_mesh(next((file for file in files if file.is_file()), files[0]), process=False)
     except (OSError, ValueError):
         return np.zeros((0, 3, 3))
     turn = collider.get("rotation")

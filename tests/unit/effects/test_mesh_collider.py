@@ -1,4 +1,7 @@
-"""Mesh colliders: distances as brute force finds them, and one scene in which all kinds of bodies meet meshes."""
+"""Mesh colliders: distances as brute force finds them, and one scene in which all kinds of bodies meet meshes.
+
+A shorter one is in validation/test_together.py.
+"""
 
 import json
 
@@ -16,8 +19,7 @@ from verlet_numba.scene.mesh_collider import meshes_of
 from verlet_numba.scene.place import place
 from verlet_numba.scene.problems import SceneError
 
-pytestmark = pytest.mark.validate         # compiling a frame with meshes takes minutes
-
+in_a_frame = pytest.mark.validate           # compiling a frame for this scene takes minutes
 BOWL, RADIUS = [6, 0, 2], 1.0
 LIFT, CARRY = 0.4, 0.6      # m
 
@@ -103,6 +105,7 @@ def seen(folder):
     return {body.name: part for body, part in zip(bodies, np.split(position, cuts, axis=1), strict=True)}, measures
 
 
+@in_a_frame
 @pytest.mark.parametrize("body", ["crate", "turned", "die", "beads", "points"])
 def test_a_body_slides_straight_over_a_tessellated_floor(seen, body):
     centre = seen[0][body][:40].mean(axis=1)
@@ -112,6 +115,7 @@ def test_a_body_slides_straight_over_a_tessellated_floor(seen, body):
     np.testing.assert_allclose(height, np.tile(height[:1], (40, 1)), atol=1e-4)
 
 
+@in_a_frame
 def test_marbles_and_grains_stay_in_the_bowl(seen):
     for body in ("marbles", "grains"):
         depth = np.linalg.norm(seen[0][body] - BOWL, axis=2)
@@ -119,29 +123,34 @@ def test_marbles_and_grains_stay_in_the_bowl(seen):
         assert seen[0][body][-1, :, 2].max() < BOWL[2]
 
 
+@in_a_frame
 def test_cloth_lies_on_a_ball(seen):
     apart = np.linalg.norm(seen[0]["scarf"] - [10, 0, 0.5], axis=2)
     assert apart.min() > 0.5 * 0.985 + 0.01 - 2e-3         # the icosphere's faces lie within the sphere
     assert (apart[-1] < 0.53).sum() > 20
 
 
+@in_a_frame
 def test_a_box_of_triangles_is_a_box(seen):
     np.testing.assert_allclose(seen[0]["on_mesh"] + [3, 0, 0], seen[0]["on_box"], atol=0.02)
     assert seen[0]["on_mesh"][-1, :, 2].min() == pytest.approx(0.6, abs=1e-3)
 
 
+@in_a_frame
 @pytest.mark.parametrize("body", ["below", "dart", "rising"])
 def test_a_sheet_is_met_from_below(seen, body):
     assert seen[0][body][:, :, 2].max() < 1 + 1e-6
     assert seen[0][body][:10, :, 2].max() > 0.9
 
 
+@in_a_frame
 @pytest.mark.parametrize("body", ["rider", "guest"])
 def test_a_moving_mesh_carries(seen, body):
     moved = seen[0][body][-1].mean(axis=0) - seen[0][body][0].mean(axis=0)
     np.testing.assert_allclose(moved, [CARRY, 0, LIFT], atol=0.02)
 
 
+@in_a_frame
 def test_nothing_penetrates(seen):
     assert seen[1][:, 14].max() < 5e-3
 

@@ -204,11 +204,25 @@ def test_an_overlap_at_the_start_is_given_back_slowly_and_leaves_no_speed():
     np.testing.assert_allclose(apart, 0.2 + RECOVERY * reach * H * np.arange(3), rtol=1e-4)
 
 
-@pytest.mark.parametrize(("overlap", "met", "standing", "left"), [
-    (0.3, 9, 0.5, 0.2), (0.3, 9, 0.1, 0.1), (0.05, 9, 0.5, 0.0), (0.3, 10, 0.5, 0.3), (0.3, 8, 0.5, 0.5), (0.3, -2, 0.0, 0.0)],
-    ids=["shrinks", "no more than stands", "is gone", "second pass", "met anew", "met apart"])
-def test_what_is_left_of_an_overlap(overlap, met, standing, left):
-    assert still_given(overlap, met, 10, standing, 0.1) == pytest.approx(left)
+@pytest.mark.parametrize(("overlap", "met", "left"), [
+    (0.3, 9, 0.2), (0.05, 9, 0.0), (0.3, 10, 0.3), (0.3, 8, np.inf), (0.0, -2, np.inf)],
+    ids=["shrinks", "is gone", "aimed once more", "met anew", "met first"])
+def test_what_an_overlap_may_still_be(overlap, met, left):
+    assert still_given(overlap, met, 10, 0.1) == pytest.approx(left)
+
+
+def test_all_of_an_overlap_stands_at_first_however_often_it_is_aimed_at():
+    """A crate that leans into another overlaps it by more at some contacts than at others; the deepest is what the pair keeps."""
+    low, high = {"degrees": 0, "axis": [0, 0, 1]}, {"degrees": 0.5, "axis": [2, 1, 0]}
+    case = Case([{**CRATE, "name": "low", "position": [0, 0, 0], "rotation": low},
+                 {**CRATE, "name": "high", "position": [0.02, 0.01, 0.28], "rotation": high}], SMOOTH).found(number=3)
+    for _ in range(3):
+        np.testing.assert_allclose(case.answer[:, 0], 0, atol=1e-15)
+        aim_hulls(case.meet, case.effects.hulls, None, case.rigid, case.touches, HULLS, 3, H)
+    depth = case.model.world.effects.hulls.corner[2, :8].max() - case.x[2, case.indices[1]].min()
+    assert case.count > 1
+    assert case.meet.pairs.overlap[0] == pytest.approx(depth, rel=0.05)
+    assert (case.line[:, 2] > 0.9).all() or (case.line[:, 2] < -0.9).all()
 
 
 @pytest.mark.parametrize(("standing", "overlap", "push", "left"), [

@@ -51,13 +51,13 @@ class Scene:
 
     def settle(self):
         settle(self.particles.position, self.particles.previous, self.number, self.rest, self.contact, self.hulls, self.meet,
-               self.effects.touches, self.effects.features)
+               self.effects.points, self.effects.mixed, self.effects.touches, self.effects.features)
         return set(np.flatnonzero(self.rest.resting))
 
     def wake(self, moving=None):
         self.number += 5
         woken = wake(self.particles.position, self.particles.acceleration, self.particles.inverse_mass, self.number, STEP,
-                     self.rest, self.contact, self.hulls, self.meet, moving)
+                     self.rest, self.contact, self.hulls, self.meet, self.effects.points, self.effects.mixed, moving)
         return woken, set(np.flatnonzero(self.rest.resting))
 
     def rests(self, *islands):
@@ -211,6 +211,21 @@ def test_depth_is_kept_while_an_island_rests():
     assert depth_at_rest(scene.rest) == pytest.approx(np.linalg.norm(p - q))
 
 
+def test_what_deformable_bodies_touch_is_awake():
+    """It does not come to rest, nor does its island; and at rest it wakes with its island. All others rest."""
+    rope = {"kind": "rope", "name": "line", "start": [0, 0, 2], "end": [1, 0, 2], "segments": 2, "mass": 1}
+    scene = Scene(SCENE | {"bodies": [*SCENE["bodies"], rope]})
+    mixed, first = scene.effects.mixed, len(scene.effects.points.body) - 3
+    mixed.pairs.first[:2], mixed.pairs.second[:2], mixed.meetings.pair[0], mixed.meetings.listed[0] = [4, 2], first, 1, 1
+    scene.rests([0, 1], [2, 3], [4, 5])
+    assert set(np.flatnonzero(scene.rest.resting)) == {0, 1, 4, 5}
+    assert scene.rest.slow[2] == 0
+    scene.meet.meetings.listed[0] = mixed.meetings.listed[0] = 0
+    assert scene.wake() == (False, {0, 1, 4, 5})
+    mixed.meetings.pair[0], mixed.meetings.listed[0] = 0, 1
+    assert scene.wake() == (True, {0, 1})
+
+
 def test_kinds_of_bodies():
     cube, corners = SCENE["bodies"][0], list(range(8))
     more = [cube | {"name": "fixed", "fixed": True}, cube | {"name": "hung", "position": [0, 2, 1], "pinned": [0, 1]},
@@ -227,6 +242,6 @@ def test_absent_rest_leaves_no_trace():
     assert worlds.built(SCENE | {"bodies": [SCENE["bodies"][0] | {"fixed": True}]}).world.effects.rest is None
     assert at_rest(None) == depth_at_rest(None) == 0
     assert not idle(None, None)
-    assert not wake(None, None, None, 0, 0.1, None, None, None, None, None)
+    assert not wake(None, None, None, 0, 0.1, *[None] * 7)
     hold(None, None, None, None)
-    settle(None, None, 0, None, None, None, None, None, None)
+    settle(None, None, 0, *[None] * 8)

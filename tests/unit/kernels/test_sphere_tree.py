@@ -378,6 +378,23 @@ def test_attached_particles_never_meet():
     assert found(joined, 0.0) == found(this, 0.0) - {tuple(sorted(joint[0].tolist()))}
 
 
+def test_particles_never_meet_the_leaves_they_are_held_at():
+    """Rigid leaves are numbered after all particles."""
+    rope = shapes.rope([0, 0, 0], [1, 0, 0], 4, mass=1, thickness=0.1)
+    this = case([(rope, rope.positions[None]), (CRATE, CRATE.positions[None])])
+    update_layered(this.position, this.layered)
+    every, count = candidates_of(1000), len(this.layered.radius)
+    assert list_against(this.layered, this.position, this.wrapped, 10.0, this.stack, every)
+    held, leaf = listed(every)[3]
+    apart, partner = this.layered.apart.copy(), this.layered.partner
+    apart[held + 1:] += 1
+    partner = np.insert(partner, apart[held + 1] - 1, count + leaf)
+    some = candidates_of(1000)
+    assert list_against(this.layered._replace(apart=apart, partner=partner), this.position, this.wrapped, 10.0, this.stack, some)
+    assert set(listed(every)) - set(listed(some)) == {(held, leaf)}
+    assert len(listed(every)) == len(listed(some)) + 1
+
+
 def test_nothing_is_nothing():
     update_layered(None, None)
     expire(None)

@@ -173,7 +173,7 @@ def test_the_buffers_of_a_built_scene_are_these():
     hulls = model.world.effects.hulls
     assert isinstance(hulls, Hulls)
     assert all(array.flags.c_contiguous for array in hulls)
-    np.testing.assert_array_equal(hulls.flat, [0, 0, 0, 1, 0, 1, 0, 1, 1])      # dice, crate, die, block, sphere, box, cylinder
+    np.testing.assert_array_equal(hulls.flat, [0, 0, 0, 1, 0, 1, 0, 1, 1, 1, 1])      # dice, crate, die, block, colliders
 
 
 def test_a_part_of_particles_within_has_fewer_corners():

@@ -256,22 +256,6 @@ attachments: [[a, 4, b, %s]]
     assert paths(text % (101, "true", [], 0), "masses of") == []
 
 
-def test_attachments_that_contact_works_against():
-    text = """
-bodies:
-  - {kind: rope, name: line, start: [0, 0, 0], end: [1, 0, 0], segments: 2, mass: 1, thickness: %s}
-  - {kind: %s, mass: 1, position: [1.5, 0.5, 0.5]}
-attachments: [[line, 2, %s, 0]]
-"""
-    box, cloth = ("box, size: [1, 1, 1]", "box_1"), ("cloth, size: [1, 1], resolution: [2, 2], thickness: 0.2", "cloth_1")
-    assert paths(text % (0.1, *box), "pushes the attached particle away") == ["attachments.0"]
-    assert paths(text % (0, *box), "pushes") == []
-    raised = text.replace("0.5, 0.5]", "0.5, 0]")
-    assert paths(raised % (0.79, *cloth), "pushes") == []
-    assert paths(raised % (0.81, *cloth), "the sphere of cloth_1 pushes the neighbours") == ["attachments.0"]
-    assert paths(raised % (0.81, *cloth) + "effects: {contact: none}", "pushes") == []
-
-
 def test_float32_far_from_the_origin():
     text = "bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [%s, 0, 0]}]\noutput: {precision: %s}\n"
     assert paths(text % (1e7, "float32"), "too coarse") == ["output.precision"]

@@ -42,6 +42,7 @@ POST = "colliders: [{kind: cylinder, radius: 1, length: 2, position: [5, 5, 5]}]
     (MIXED, "", "deformable contact", "2 bodies, as spheres about particles"),
     (MIXED, "", "deformable against rigid", "10 particles, 2 rigid bodies"),
     ([ROPE % ""], SELF, "self-contact", "effects.self_collision"),
+    (MIXED, "effects: {rest: {}}", "rest", "effects.rest"),
 ])
 def test_phases_that_are_there(bodies, rest, phase, why):
     assert phases(bodies, rest)[phase] == (True, why)

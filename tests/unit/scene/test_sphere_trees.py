@@ -1,5 +1,6 @@
 """Trees of spheres as they are built: balanced whatever the points, with the smallest spheres and the right exclusions."""
 
+from dataclasses import replace
 from math import log2
 
 import numpy as np
@@ -159,6 +160,9 @@ def test_wrapped_trees_are_those_of_every_copy():
     assert wrapped_of(bodies[1:2], number(bodies[1:2])) is None
 
 
+NONE = np.zeros((0, 2), np.int64)
+
+
 def never(layered):
     return {(p, int(q)) for p in range(len(layered.radius)) for q in layered.partner[layered.apart[p]:layered.apart[p + 1]]}
 
@@ -169,14 +173,40 @@ def test_pairs_that_never_meet(shape):
     bodies = [body(shapes.box([1, 1, 1], mass=1)), body(shape, 2)]
     numbering = number(bodies)
     copies = numbering.bodies[1]
-    attached = np.array([[copies[0, 0], copies[1, -1]]])
-    expected = {tuple(copies[k, list(stick)]) for k in range(2) for stick in shape.sticks} | {tuple(attached[0])}
+    expected = {tuple(copies[k, list(stick)]) for k in range(2) for stick in shape.sticks}
     for i, p in enumerate(shape.positions):
         for j in range(i):
             if np.linalg.norm(p - shape.positions[j]) < 2 * shape.radius:
                 expected |= {(copies[k, i], copies[k, j]) for k in range(2)}
-    layered = layered_of(bodies, numbering, numbering.size, np.float64, attached)
+    layered = layered_of(bodies, numbering, numbering.size, np.float64, NONE)
     assert never(layered) == expected | {(j, i) for i, j in expected}
+
+
+def pulled(particle, radius, spot, other):
+    """The largest gap that any motion can open between two spheres whose bodies are joined."""
+    return np.linalg.norm(particle) + np.linalg.norm(spot) - radius - other
+
+
+@pytest.mark.parametrize("thick", [0.05, 0.3, 0.9])
+def test_what_an_attachment_holds_together_never_meets(thick):
+    """A rope's particles and those of a cloth that it is tied to, which no motion parts; likewise the hull of a box."""
+    line, cloth = shapes.rope([0, 0, 0], [1, 0, 0], 9, mass=1, thickness=thick), sheet(5, 4, 0.2)
+    crate = replace(shapes.box([1, 1, 1], mass=1), radius=0.04)
+    bodies = [body(crate, 3), body(line, 2), body(cloth)]
+    numbering = number(bodies)
+    (crates, lines, cloths), size = numbering.bodies, numbering.size + 3        # arrays may be longer than the numbering
+    apart = layered_of(bodies, numbering, size, np.float64, NONE)
+    attached = np.array([[crates[1, 6], lines[1, 2]], [lines[0, 9], cloths[0, 7]]])
+    expected = {(lines[1, s], size + 1) for s, p in enumerate(line.positions)
+                if s == 2 or pulled(p - line.positions[2], line.radius, np.zeros(3), 0.04) < 0}
+    for s, p in enumerate(line.positions):
+        for t, q in enumerate(cloth.positions):
+            gap = pulled(p - line.positions[9], line.radius, q - cloth.positions[7], cloth.radius)
+            expected |= {(lines[0, s], cloths[0, t]), (cloths[0, t], lines[0, s])} if gap < 0 else set()
+    expected |= {(lines[0, 9], cloths[0, 7]), (cloths[0, 7], lines[0, 9]), (crates[1, 6], lines[1, 2]), (lines[1, 2], crates[1, 6])}
+    layered = layered_of(bodies, numbering, size, np.float64, attached)
+    assert never(layered) - never(apart) == expected
+    assert len(expected) > (30 if thick > 0.5 else 4)
 
 
 @pytest.mark.parametrize("diagonals", ["one", "both"])

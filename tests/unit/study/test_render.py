@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 
 from verlet_numba.run.trajectory import BodyTable, Contents, TrajectoryFile
+from verlet_numba.study import reader
 from verlet_numba.study import render as pictures
 from verlet_numba.study.camera import NOTHING, Camera, frame_points, rotation_about, visible
 from verlet_numba.study.render import BACKGROUND, RenderError, render
@@ -25,7 +26,7 @@ COLLIDERS = [
     {"kind": "box", "size": [0.2, 0.2, 0.2], "position": [0, 0.6, 0.1]}]
 
 
-def write(path, colliders=COLLIDERS, frames=12):
+def write(path, colliders=COLLIDERS, frames=12, **provenance):
     """A square that falls to the ground, a rope of three particles and two loose ones beside it."""
     start = np.array([[-0.3, -0.3, 1], [0.3, -0.3, 1], [0.3, 0.3, 1], [-0.3, 0.3, 1], [-0.5, 0, 1], [-0.5, 0, 0.7],
                       [-0.5, 0, 0.4], [0.5, 0.5, 0.5], [0.5, 0.5, 0.8]])
@@ -36,7 +37,7 @@ def write(path, colliders=COLLIDERS, frames=12):
     scene = {"name": "still_life", "bodies": [{"name": "line", "thickness": 0.05}, {"name": "sheet"}, {"name": "dust"}],
              "colliders": colliders}
     contents = Contents(9, np.zeros((0, 2), int), np.zeros(0), [np.array([4, 5, 6])], np.array([[0, 1, 2], [0, 2, 3]]),
-                        bodies, {}, {"scene_text": "", "scene": json.dumps(scene)})
+                        bodies, {}, {"scene_text": "", "scene": json.dumps(scene), **provenance})
     with TrajectoryFile(path, contents, frames) as file:
         file.append(time, np.arange(frames), {"position": position}, {})
         file.finish("complete", "", {})
@@ -174,11 +175,28 @@ def test_colliders_move_as_the_scene_says():
     np.testing.assert_allclose(placed(started, 0.5).origin, [1.5, 2, 3])
 
 
+def test_files_of_meshes_are_those_of_the_scene_wherever_the_trajectory_is(tmp_path):
+    """Of the folder that the scene was in when it ran, or, if that is gone, of the trajectory's own."""
+    scenes, away, both = (tmp_path / name for name in ("scenes", "away", "both"))
+    for folder in (scenes, away, both):
+        folder.mkdir()
+    corner = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"
+    (scenes / "corner.obj").write_text(corner + "f 1 2 4\n")
+    (both / "corner.obj").write_text(corner)
+    seen = {}
+    for name, folder, scene in (("away", away, scenes), ("lost", away, tmp_path / "lost"), ("moved", both, tmp_path / "lost"),
+                                ("both", both, scenes)):
+        path = write(folder / f"{name}.vtkhdf", [{"kind": "mesh", "file": "corner.obj"}], folder=str(scene))
+        with reader.open(path) as trajectory:
+            seen[name] = len(pictures.View(trajectory, 40, 30).solids[0])
+    assert seen == {"away": 2, "lost": 0, "moved": 1, "both": 2}
+
+
 @pytest.mark.parametrize(("collider", "volume"), [
     ({"kind": "box", "size": [1, 2, 3]}, 6), ({"kind": "sphere", "radius": 2.0}, 4 / 3 * np.pi * 8),
     ({"kind": "cylinder", "radius": 0.5, "axis": [1, 1, 0], "length": 2.0}, np.pi / 2)])
 def test_solids_are_closed_and_of_the_right_size(collider, volume, tmp_path):
-    triangles = solid(collider, tmp_path)
+    triangles = solid(collider, [tmp_path])
     cones = np.abs((np.cross(triangles[:, 0], triangles[:, 1]) * triangles[:, 2]).sum(axis=1)) / 6
     assert cones.sum() == pytest.approx(volume, rel=0.01)
 
