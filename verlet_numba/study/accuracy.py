@@ -78,6 +78,8 @@ class Study:
     effects: dict[str, Point]                   # the scene's own settings without each effect
     refused: dict[str, list[str]]               # settings that the scene or the program does not allow, by the reason
     unfinished: int = 0                         # settings for which there was no time
+    phases: dict[str, float] = field(default_factory=dict)     # s of a run under the scene's own settings, by phase
+    whole: float = 0.0                          # s of that run
 
     @property
     def unit(self) -> str:
@@ -136,6 +138,7 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
     kept = EFFECTS_SHARE * budget.seconds
     trials = explore(found, loaded, sets, settings, budget, kept, say)
     leave_out(found, loaded, sets, trial, budget, say)
+    found.phases, found.whole = trial.phases(base.seconds)
     repeat(found, trials, budget)
     mark_front(found.points)
     return found

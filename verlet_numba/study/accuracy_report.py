@@ -29,6 +29,11 @@ def table(study: Study) -> Iterator[str]:
         for name, point in study.effects.items():
             saved = 1.0 - point.cost / study.own.cost if study.own.cost else 0.0
             yield f"  {name:<20} saves {saved:+7.1%} of the time, changes {point.error:.3g} m"
+    if study.phases:
+        total = sum(study.phases.values())
+        yield f"time by phase, in all {total:.3g} s of a run of {study.whole:.3g} s:"
+        for name, seconds in sorted(study.phases.items(), key=lambda phase: -phase[1]):
+            yield f"  {name:<24}{seconds / total:6.1%}  {seconds:.3g} s"
     yield from (f"left out, {'; '.join(names)}: {reason}" for reason, names in study.refused.items())
     if study.unfinished:
         yield f"no time was left for {study.unfinished} settings: give more with --budget"
@@ -65,7 +70,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "closed_form": None if study.closed_form is None else study.closed_form.model_dump(),
         "own": of_point(study.own), "points": [of_point(point) for point in study.points],
         "effects": {name: of_point(point) for name, point in study.effects.items()},
-        "refused": study.refused, "unfinished": study.unfinished}
+        "phases": study.phases, "phases_of_seconds": study.whole, "refused": study.refused, "unfinished": study.unfinished}
     plain: dict[str, Any] = finite(document)
     return plain
 
@@ -121,14 +126,15 @@ def draw(study: Study, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    canvas = Figure(figsize=(13, 9), layout="constrained")
+    canvas = Figure(figsize=(16, 10), layout="constrained")
     FigureCanvasAgg(canvas)
-    (work, strain), (passes, effects) = canvas.subplots(2, 2)
+    panels = canvas.subplot_mosaic([["work", "work", "strain"], ["passes", "effects", "phases"]], height_ratios=[3, 2])
     canvas.suptitle(f"{study.name}: what accuracy costs")
-    draw_work(study, work)
-    draw_strain(study, strain)
-    draw_passes(study, passes)
-    draw_effects(study, effects)
+    draw_work(study, panels["work"])
+    draw_strain(study, panels["strain"])
+    draw_passes(study, panels["passes"])
+    draw_effects(study, panels["effects"])
+    draw_phases(study, panels["phases"])
     canvas.savefig(path, dpi=100)
 
 
@@ -220,3 +226,10 @@ def draw_effects(study: Study, axes: Any) -> None:
         axes.annotate(f" changes {point.error:.2g} m", (max(saved[place], 0), place), va="center", fontsize=8)
     axes.axvline(0, color="grey", linewidth=0.8)
     axes.set(xlabel="saved by leaving it out [% of the time]", title="what each effect costs and changes")
+
+
+def draw_phases(study: Study, axes: Any) -> None:
+    """Where the time of a run under the scene's own settings goes."""
+    phases = sorted(study.phases.items(), key=lambda phase: phase[1])
+    axes.barh([name for name, _ in phases], [100 * seconds / sum(study.phases.values()) for _, seconds in phases])
+    axes.set(xlabel="% of the time", title="time by phase")

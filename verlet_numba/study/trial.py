@@ -19,6 +19,7 @@ from verlet_numba.scene.place import place
 from verlet_numba.scene.plan import bodies_meet, frame_count
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.support import unsupported
+from verlet_numba.study.phases import phase_seconds
 
 SAMPLES = 64                    # frames of a run that are kept, at most
 SPEED_AT_REST = 0.01            # m/s
@@ -78,6 +79,10 @@ class Trial:
         return Outcome(True, seconds, chosen / self.scene.time.frame_rate, chunk.position[chosen],
                        summarised(series, self.scene.time.frame_rate),
                        {name: float(np.linalg.norm(values[-1])) for name, values in series.items()})
+
+    def phases(self, seconds: float) -> tuple[dict[str, float], float]:
+        """Seconds of each phase of a run, and of the whole run, which takes about so many seconds."""
+        return phase_seconds(self._started(), frame_count(self.scene), seconds)
 
 
 def displace(model: Model, shift: float, seed: int) -> None:
