@@ -1,4 +1,4 @@
-"""What accuracy costs in six scenes: `python bench/accuracy.py [NAME...] [--budget S]`.
+"""What accuracy costs in six scenes: `python bench/accuracy_reports.py [NAME...] [--budget S]`.
 
 Writes bench/accuracy/NAME/accuracy.csv, .json and .png, what `verlet-numba accuracy` finds out about each, and prints its
 table. docs/accuracy.md reads them.
@@ -7,13 +7,13 @@ table. docs/accuracy.md reads them.
 from pathlib import Path
 
 import click
-from cases import SCENES
 from report import machine
 
 from verlet_numba.scene.load import load
 from verlet_numba.study import accuracy_report
 from verlet_numba.study.accuracy import study
 
+SCENES = Path(__file__).parents[1] / "scenes"
 FOLDER = Path(__file__).parent / "accuracy"
 STUDIES: dict[str, tuple[str, tuple[str, ...]]] = {
     "pendulum": ("validation/pendulum.yaml", ()),
