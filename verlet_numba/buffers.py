@@ -568,6 +568,19 @@ class Snapshot(NamedTuple):
     counts: Array               # (3,) int 1; relaxations since the last frame; contacts and relaxations of the kept frame
 
 
+class Stopwatch(NamedTuple):
+    """Where the time goes (kernels/stopwatch.py)."""
+
+    clock: int                  # int 1; which of the system's clocks is read
+    every: int                  # int 1; one substep in so many is timed
+    running: Array              # (1,) int 1; 1: the present one is
+    sampled: Array              # (1,) int 1; how many have been
+    last: Array                 # (1,) int 1; the last reading of the clock, in nanoseconds
+    spent: Array                # (F,) int 1; nanoseconds of each phase
+    laps: Array                 # (F,) int 1; how often each has ended
+    spec: Array                 # (2,) int 1; the clock's seconds and nanoseconds
+
+
 class World(NamedTuple):
     """Everything that a simulation is."""
 
@@ -584,6 +597,7 @@ class World(NamedTuple):
     observed: Observed
     snapshot: Snapshot
     clock: Array                # (4,) int 1; FRAME of the chunk, SUBSTEP of the frame, NUMBER of substeps of all, STAGE
+    stopwatch: Stopwatch | None
 
 
 class Frames(NamedTuple):

@@ -166,6 +166,50 @@ def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) 
         raise Misuse(str(error)) from error
 
 
+@cli.command()
+@SCENE
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder of table and picture. [default: NAME.accuracy]")
+@SETS
+@click.option("--axis", "axes", multiple=True, metavar="PATH=VALUE,...",
+              help="Compare these values, of several axes every combination. [default: the solver's settings one at a time]")
+@click.option("--runs", type=click.IntRange(1), default=40, show_default=True, help="Settings to compare, at most.")
+@click.option("--budget", type=click.FloatRange(0, min_open=True), default=80.0, show_default=True,
+              help="Seconds to spend on running; compiling comes on top.")
+@click.option("--target-error", type=click.FloatRange(0, min_open=True), help="Name the cheapest setting with no larger error.")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@AS_JSON
+@QUIET
+def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tuple[str, ...], runs: int, budget: float,
+             target_error: float | None, overwrite: bool, as_json: bool, quiet: bool) -> None:
+    """Show what accuracy costs in time: SCENE under many settings, against what is true of it."""
+    from verlet_numba.scene.prepare import prepare
+
+    prepared = prepare(scene, sets)
+    folder = output or Path(default_name(prepared.scene, scene)).with_suffix(".accuracy")
+    if folder.exists() and not overwrite:
+        raise Misuse(f"{folder} exists already; give another with -o, or --overwrite")
+
+    from verlet_numba.study import accuracy_report as report
+    from verlet_numba.study.accuracy import study
+    from verlet_numba.study.axes import AxisError, parse
+
+    try:
+        found = study(prepared.loaded, sets, parse(axes), runs, budget, (lambda text: None) if quiet else say)
+    except AxisError as error:
+        raise Misuse(str(error)) from error
+    report.write(found, folder)
+    best = found.cheapest(target_error) if target_error is not None else None
+    if as_json:
+        print_json(report.as_dict(found) | {"cheapest": None if best is None else report.finite(report.of_point(best))})
+    elif not quiet:
+        click.echo("\n".join(report.table(found)))
+        click.echo(f"written: {folder}/accuracy.csv, .json, .png")
+    if best is not None and not as_json:
+        click.echo(report.solver_yaml(best, prepared.scene.solver.model_dump(exclude_unset=True)))
+    if target_error is not None and best is None:
+        raise click.ClickException(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+
+
 def chosen(frames: str | None) -> list[int | slice] | None:
     """Numbers and ranges FIRST:END:STEP (END not included), separated by commas; negative ones count from the end."""
     if frames is None:

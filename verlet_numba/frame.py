@@ -44,6 +44,23 @@ from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
 from verlet_numba.kernels.relax_graph import relax_graph
+from verlet_numba.kernels.stopwatch import (
+    ANSWERING,
+    DAMPING,
+    DRAG,
+    FINDING,
+    FRAMES,
+    GRAVITY,
+    INTEGRATION,
+    PATHS,
+    REBOUND,
+    RELAXATION,
+    REST,
+    WEIGHING,
+    WIND,
+    begin,
+    lap,
+)
 
 OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 
@@ -56,7 +73,7 @@ def advance(world, frames, budget):
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
     particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided = world[:8]
-    effects, solver, observed, snapshot, clock = world[8:]
+    effects, solver, observed, snapshot, clock, stopwatch = world[8:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
@@ -71,20 +88,28 @@ def advance(world, frames, budget):
                 if clock[SUBSTEP] == substeps - 1:
                     contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
                     keep(position, previous, snapshot, contacts)
+                begin(stopwatch, clock[NUMBER])
                 settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
                 if idle(rest, moving):                                      # all bodies rest: no work
                     clock[NUMBER] += 1
                     clock[SUBSTEP] += 1
                     continue
+                lap(stopwatch, REST)
                 fall(acceleration, gravity)
+                lap(stopwatch, GRAVITY)
                 blow(position, previous, acceleration, h, wind)
+                lap(stopwatch, WIND)
                 resist(position, previous, acceleration, h, drag)
+                lap(stopwatch, DRAG)
                 damp(position, previous, acceleration, h, damping)
+                lap(stopwatch, DAMPING)
                 integrate(position, previous, acceleration, h)              # Verlet (P5)
+                lap(stopwatch, INTEGRATION)
                 carry(position, end, carried)
                 move(contact, end, moving)
                 hold(position, previous, inverse_mass, rest)
                 move_hulls(hulls, contact, moving)
+                lap(stopwatch, PATHS)
                 gather(position, hulls)
                 gather(position, points)
                 clock[STAGE] = INTEGRATED
@@ -98,6 +123,7 @@ def advance(world, frames, budget):
                     break
                 gather(position, hulls)
                 gather(position, points)
+            lap(stopwatch, FINDING)
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
@@ -117,6 +143,7 @@ def advance(world, frames, budget):
             forget(runs_softness)
             forget(sticks_softness)
             note_places(position, collided)
+            lap(stopwatch, WEIGHING)
             for again in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
                 part_spheres(position, previous, inverse_mass, spheres)         # (P22)
@@ -131,12 +158,14 @@ def advance(world, frames, budget):
                 begin_pass(again, friction, rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)
+                lap(stopwatch, ANSWERING)
                 if not again:
                     choose_lists(position, collided, graph)                 # of the particles moved most (P9)
                 snapshot.counts[0] += relax_graph(position, graph, tolerance, approximate)
                 snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
                 snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
                 snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
+                lap(stopwatch, RELAXATION)
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)
             keep_hulls(meet, rigid, touches, HULLS)
@@ -148,6 +177,7 @@ def advance(world, frames, budget):
             rub_features(position, previous, inverse_mass, mixed, points, features, friction, MIXED)
             rub_spheres(position, previous, inverse_mass, spheres, friction)
             hold(position, previous, inverse_mass, rest)
+            lap(stopwatch, REBOUND)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
@@ -160,6 +190,7 @@ def advance(world, frames, budget):
         frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
+        lap(stopwatch, FRAMES)
         if not sound:
             return DIVERGED
         clock[SUBSTEP] = 0

@@ -17,7 +17,8 @@ OCCURS = {
     "narrow.collide": {"meet", "mixed"}, "sphere_tree.list_pairs": {"spheres"}, "sphere_tree.list_against": {"mixed"},
     "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
-    "relax_graph.sort_bodies": {"graph", "collided"}, "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"}}
+    "relax_graph.sort_bodies": {"graph", "collided"}, "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"},
+    "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))

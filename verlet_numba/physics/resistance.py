@@ -11,24 +11,20 @@ from verlet_numba._jit import formula
 
 
 @formula
-def resisted(acceleration, displacement, air, k, h):
-    """Acceleration [m/s^2] with the resistance k [1/s] against air [m/s]; displacement of the last step [m], step h [s]."""
-    return (acceleration - k * (displacement / h - air)) / (1.0 + 0.5 * k * h)
-
-
-@formula
 def drag(ax, ay, az, dx, dy, dz, wx, wy, wz, linear, quadratic, h):
-    """Acceleration with drag -(linear + quadratic |v - w|) (v - w); linear [1/s], quadratic [1/m], w the air [m/s].
+    """Acceleration with drag -k (v - w), k = linear + quadratic |v - w|; linear [1/s], quadratic [1/m], w the air [m/s].
 
-    The speed in the quadratic part is first taken from the half step before, then once more from the central
-    difference that follows from it: second order in h.
+    The speed in k is first taken from the half step before, u = d/h - w, then once more from the central difference that
+    follows from it, u + a h/2: second order in h.
     """
-    sx, sy, sz = dx / h - wx, dy / h - wy, dz / h - wz
-    bx, by, bz = ax, ay, az
+    one, half = 1.0 / h, 0.5 * h
+    ux, uy, uz = dx * one - wx, dy * one - wy, dz * one - wz
+    sx, sy, sz, bx, by, bz = ux, uy, uz, ax, ay, az
     for _ in range(2):
         k = linear + quadratic * math.sqrt(sx * sx + sy * sy + sz * sz)
-        bx, by, bz = resisted(ax, dx, wx, k, h), resisted(ay, dy, wy, k, h), resisted(az, dz, wz, k, h)
-        sx, sy, sz = dx / h + 0.5 * h * bx - wx, dy / h + 0.5 * h * by - wy, dz / h + 0.5 * h * bz - wz
+        share = 1.0 / (1.0 + k * half)
+        bx, by, bz = (ax - k * ux) * share, (ay - k * uy) * share, (az - k * uz) * share
+        sx, sy, sz = ux + half * bx, uy + half * by, uz + half * bz
     return bx, by, bz
 
 

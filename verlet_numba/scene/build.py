@@ -71,7 +71,7 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     observed = observed_of(scene, bodies, numbering)
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
-    world = World(particles, *joined, graph, collided, effects, solver, observed, snapshot, clock)
+    world = World(particles, *joined, graph, collided, effects, solver, observed, snapshot, clock, None)
     return Model(scene, bodies, numbering, world)
 
 

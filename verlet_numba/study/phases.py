@@ -1,0 +1,62 @@
+"""Time by phase of a model's run, from sampled substeps."""
+
+import time
+
+import numpy as np
+
+from verlet_numba.buffers import Stopwatch, gate
+from verlet_numba.kernels.stopwatch import PHASES, idle_laps
+from verlet_numba.run.engine import run_chunk, start, warm
+from verlet_numba.scene.build import Model, frames
+
+SHORT = 2e-5            # s: a substep that takes less is over before anything else gets the processor
+SAMPLES = 200           # substeps that are timed, at least, if the run has as many
+LAPS = 10_000           # to see what reading the clock takes
+NOTHING = 1e-3          # of the time: a phase of what the scene has not
+
+
+def phase_seconds(model: Model, count: int, seconds: float) -> tuple[dict[str, float], float]:
+    """Run `count` frames from the start with a stopwatch: seconds of each phase that took any, and of the whole run.
+
+    seconds: what the run takes about. Phases are timed in some substeps and scaled to all of them, by the processor's time
+    of this thread, where substeps are short by the time of day, which is read ten times as fast (30 ns). So their sum
+    differs from the whole by chance. Empty on systems without these clocks (POSIX).
+    """
+    if not hasattr(time, "CLOCK_THREAD_CPUTIME_ID"):
+        return {}, 0.0
+    substeps = (count - 1) * model.world.solver.substeps + 1
+    clock = time.CLOCK_MONOTONIC if seconds < SHORT * substeps else time.CLOCK_THREAD_CPUTIME_ID
+    watch = stopwatch(clock, spacing(substeps, model.world.solver.substeps))
+    model.world = model.world._replace(stopwatch=watch)
+    warm(start(model))
+    for array in (watch.sampled, watch.spent, watch.laps):
+        array[:] = 0
+    chunk = frames(model, count)
+    begin = time.thread_time()
+    run_chunk(start(model), chunk)
+    whole = time.thread_time() - begin
+    scale = 1e-9 * substeps / max(1, int(watch.sampled[0]))
+    spent = np.maximum(0.0, watch.spent - nanoseconds_a_lap(clock) * watch.laps) * scale
+    return {name: float(seconds) for name, seconds in zip(PHASES, spent, strict=True) if seconds > NOTHING * spent.sum()}, whole
+
+
+def stopwatch(clock: int, every: int) -> Stopwatch:
+    """A stopwatch that times one substep in so many by one of the system's clocks."""
+    return Stopwatch(clock, every, *(gate(np.zeros(size), np.int64) for size in (1, 1, 1, len(PHASES), len(PHASES), 2)))
+
+
+def nanoseconds_a_lap(clock: int) -> float:
+    """What reading the clock takes."""
+    watch = stopwatch(clock, 1)
+    for _ in range(2):                  # the second time it is compiled
+        watch.spent[0] = 0
+        idle_laps(watch, LAPS)
+    return float(watch.spent[0]) / LAPS
+
+
+def spacing(substeps: int, a_frame: int) -> int:
+    """One substep in so many: without a common divisor with those of a frame, so that each of a frame's has its turn."""
+    every = max(1, substeps // SAMPLES)
+    while np.gcd(every, a_frame) > 1:
+        every += 1
+    return every
