@@ -138,12 +138,12 @@ def six_volumes(corners: Array) -> Array:
 
 def kinetic_energy(part: Part, block: Block) -> Array:
     """Sum of m v²/2."""
-    return 0.5 * np.einsum("kni,kni,n->k", block.velocity, block.velocity, part.masses)
+    return np.asarray(0.5 * np.einsum("kni,kni,n->k", block.velocity, block.velocity, part.masses))
 
 
 def potential_energy(part: Part, block: Block) -> Array:
     """-Sum of m g . x: zero at the origin."""
-    return -np.einsum("kni,n,i->k", block.position, part.masses, part.gravity)
+    return np.asarray(-np.einsum("kni,n,i->k", block.position, part.masses, part.gravity))
 
 
 def total_energy(part: Part, block: Block) -> Array:
@@ -152,17 +152,17 @@ def total_energy(part: Part, block: Block) -> Array:
 
 def momentum(part: Part, block: Block) -> Array:
     """Sum of m v."""
-    return np.einsum("kni,n->ki", block.velocity, part.masses)
+    return np.asarray(np.einsum("kni,n->ki", block.velocity, part.masses))
 
 
 def angular_momentum(part: Part, block: Block) -> Array:
     """Sum of m x x v, about the origin."""
-    return np.einsum("kni,n->ki", np.cross(block.position, block.velocity), part.masses)
+    return np.asarray(np.einsum("kni,n->ki", np.cross(block.position, block.velocity), part.masses))
 
 
 def centre_of_mass(part: Part, block: Block) -> Array:
     """Sum of m x over that of m; the origin where nothing has a mass."""
-    return np.einsum("kni,n->ki", block.position, part.masses) / (part.masses.sum() or 1.0)
+    return np.asarray(np.einsum("kni,n->ki", block.position, part.masses) / (part.masses.sum() or 1.0))
 
 
 def constraint_errors(part: Part, block: Block) -> Array:
@@ -171,7 +171,7 @@ def constraint_errors(part: Part, block: Block) -> Array:
     if not len(pairs):
         return np.zeros((len(block.time), 1))
     between = block.position[:, pairs[:, 1]] - block.position[:, pairs[:, 0]]
-    return np.abs(np.linalg.norm(between, axis=2) / length - 1.0)
+    return np.asarray(np.abs(np.linalg.norm(between, axis=2) / length - 1.0))
 
 
 def constraint_error_max(part: Part, block: Block) -> Array:

@@ -124,10 +124,10 @@ def differences(trajectory: Trajectory, particles: slice, span: Span) -> tuple[A
     count, part = span.high - span.low, slice(span.first - span.low, span.end - span.low)
     if count < 2:
         return position[part], np.zeros_like(position[part])
-    try:
-        velocity = np.gradient(position, trajectory.time[span.low:span.high], axis=0, edge_order=min(2, count - 1))
-    except (ValueError, FloatingPointError) as error:
-        raise TrajectoryError(f"{trajectory.path}: damaged: its times do not rise ({error})") from error
+    time = trajectory.time[span.low:span.high]
+    if not (np.diff(time) > 0).all():
+        raise TrajectoryError(f"{trajectory.path}: damaged: its times do not rise")
+    velocity: Array = np.gradient(position, time, axis=0, edge_order=2 if count > 2 else 1)
     return position[part], velocity[part]
 
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.run.simulate import COMPLETE, Summary, simulate
-from verlet_numba.scene.prepare import Prepared
+from verlet_numba.scene.prepare import Prepared, prepare
+from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Expect
 from verlet_numba.study import reader
 from verlet_numba.study.measures import UNITS, lengths, measure
@@ -90,8 +91,21 @@ def scenes_in(places: Sequence[Path]) -> list[Path]:
     return [scene for scenes in found for scene in scenes]
 
 
-def verify(prepared: Prepared, quiet: bool = False) -> Case:
-    """Run a scene (prepared with IN_FULL) in a folder of its own, which is gone afterwards, and judge it."""
+def prepare_all(scenes: Sequence[Path]) -> list[Prepared]:
+    """Scenes ready to be run and judged in full. Raises one SceneError with the problems of all of them."""
+    found, problems = [], []
+    for scene in scenes:
+        try:
+            found.append(prepare(scene, IN_FULL))
+        except SceneError as error:
+            problems += error.problems
+    if problems:
+        raise SceneError(problems)
+    return found
+
+
+def run_case(prepared: Prepared, quiet: bool = False) -> Case:
+    """Run a scene in a folder of its own, which is gone afterwards, and judge it."""
     case = Case(str(prepared.loaded.source.name))
     with tempfile.TemporaryDirectory(prefix="verlet-numba-") as folder:
         output = Path(folder) / "trajectory.vtkhdf"
