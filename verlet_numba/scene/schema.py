@@ -17,6 +17,9 @@ Measure = Literal[
     "constraint_error_max", "constraint_error_rms", "penetration_max", "contacts", "relaxations", "fallbacks",
     "resting", "speed_max", "rest_time", "orientation_flips", "self_intersections", "outside"]
 
+COUNTED = ("contacts", "relaxations", "fallbacks", "resting")
+"""Measures that a run counts for the whole scene."""
+
 MAX_FRAMES = 100_000_000
 
 PAPER: dict[str, Any] = {
@@ -117,6 +120,8 @@ class Expect(Part):
             yield (), f"needs exactly one of max, min and equal, but has {' and '.join(bounds) or 'none'}"
         if self.end is not None and self.end < self.start:
             yield ("to",), f"{self.end:g} s is before `from`, {self.start:g} s"
+        if self.body is not None and self.measure in COUNTED:
+            yield ("body",), f"{self.measure} is counted for the whole scene, not for a body"
 
 
 class Reference(Part):

@@ -137,11 +137,13 @@ def written(values: Array | None, frame: int) -> float | str:
 
 
 def plot(analyses: Sequence[Analysis], path: Path) -> None:
-    """The course of every measure in a panel of its own, one colour a file; of vectors x full, y dashed, z dotted."""
+    """The course of every measure that is not 0 throughout in a panel of its own, one colour a file; of vectors x full, y
+    dashed, z dotted."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    names = list({name: None for analysis in analyses for name, values in analysis.values.items() if values.ndim})
+    courses = {name: None for analysis in analyses for name, values in analysis.values.items() if values.ndim and values.any()}
+    names = list(courses)
     columns = min(3, max(1, len(names)))
     rows = max(1, -(-len(names) // columns))
     figure = Figure(figsize=(4.2 * columns, 2.5 * rows + 0.5), layout="constrained")

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from verlet_numba.scene.schema import COUNTED
 from verlet_numba.study.from_positions import COMPUTED, Block, Part, part_of
 from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
 
@@ -24,9 +25,6 @@ UNITS = {
 """Every measure and its unit, in the order in which they are told."""
 
 VECTORS = ("momentum", "angular_momentum", "centre_of_mass")
-COUNTED = ("contacts", "relaxations", "fallbacks", "resting")
-"""What a run alone can count, for the whole scene."""
-
 COSTLY = ("self_intersections",)
 USUAL = tuple(name for name in UNITS if name not in COSTLY)
 SLOW = 0.01                     # m/s: below this all is at rest
