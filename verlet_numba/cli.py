@@ -188,7 +188,10 @@ def analyze(places: tuple[Path, ...], names: tuple[str, ...], body: str | None, 
             refuse_existing(output, overwrite)
     if picture is not None and picture.suffix.lower() not in study.PICTURES:
         raise Misuse(f"{picture}: cannot draw {picture.suffix or 'a file without suffix'}; use {', '.join(study.PICTURES)}")
-    found = [study.analyze(file, names, body, recorded=not recompute) for file in study.trajectories(places)]
+    try:
+        found = [study.analyze(file, names, body, recorded=not recompute) for file in study.trajectories(places)]
+    except study.MeasureError as error:
+        raise Misuse(str(error)) from error
     if csv_file is not None:
         study.write_csv(found, csv_file)
     if picture is not None:

@@ -13,6 +13,8 @@ from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
 
 AXES = "xyz"
 WIDTH = 12              # of a column of figures
+__all__ = ["PICTURES", "Analysis", "MeasureError", "analyze", "plot", "table", "trajectories", "write_csv"]
+
 LOGARITHMIC = ("constraint_error_max", "constraint_error_rms", "penetration_max", "speed_max")
 PICTURES = (".png", ".svg", ".pdf")
 
