@@ -16,6 +16,8 @@ LONG = ("b17", "b18", "b20", "b27", "b28", "b40", "b41", "b45")
 NOT_HELD = {
     "b01_rope_with_a_weight": "stretches by 8.8 %: 21 sticks in a row want more than one pass of 50 substeps",
     "b02_heavy_on_light": "the heavy box is thrown off after 2 s, with 64 substeps after 4 s",
+    "b28_pyramid": "stands, its top within 0.04 %, but still moves at 7.6 cm/s after 10 s, at 64 substeps at 3.2 cm/s",
+    "b45_rocking": "the crate falls asleep on its edge, 14 cm too high, at the turn of its swing",
     "b20_squashed_cube": "one of three cubes comes back as its mirror image: there is no orientation guard",
 }
 """What the present version cannot hold, with its figure: docs/hard_cases.md lists them too."""
@@ -53,6 +55,6 @@ def test_every_case_stands_in_the_documents():
     for scene in SCENES:
         row = rows[int(scene.stem[1:3]) - 1]
         assert f"`{scene.stem}`" in row
-        assert ("**not held**" in row) == any(name.startswith(scene.stem[:4]) for name in NOT_HELD), scene.stem
+        assert ("**not held**" in row) == any(name.startswith(f"{scene.stem[:3]}_") for name in NOT_HELD), scene.stem
     for name in NOT_HELD:
         assert (ROOT / "scenes" / "hard" / f"{name}.yaml").is_file()

@@ -28,7 +28,7 @@ VECTORS = ("momentum", "angular_momentum", "centre_of_mass")
 COSTLY = ("self_intersections",)
 USUAL = tuple(name for name in UNITS if name not in COSTLY)
 SLOW = 0.01                     # m/s: below this all is at rest
-BLOCK_NUMBERS = 3_000_000       # coordinates of a piece of frames
+BLOCK_NUMBERS = 1_000_000       # coordinates of a piece of frames
 RECORDED, POSITIONS = "recorded", "positions"
 
 
