@@ -31,7 +31,7 @@ def cases():
         yield pytest.param(scene, marks=marks, id=scene.stem)
 
 
-@pytest.mark.parametrize("scene", cases())
+@pytest.mark.parametrize("scene", list(cases()))
 def test_case_is_held(scene):
     case = run_case(prepare_all([scene])[0], quiet=True)
     assert case.verdicts or case.trouble
