@@ -14,7 +14,7 @@ from verlet_numba.effects.features import begin_features, part_features, rub_fea
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.impact import strike_bodies, strike_spheres
-from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, move_hulls, pushing
+from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, gather_again, move_hulls, pushing
 from verlet_numba.effects.mesh_contact import deepest_in_meshes, find_mesh_contacts
 from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
@@ -121,9 +121,8 @@ def advance(world, frames, budget):
                 part_spheres(position, previous, inverse_mass, spheres)         # (P22)
                 part_features(position, inverse_mass, meet, hulls, features, HULLS)    # (P19 to P21)
                 part_features(position, inverse_mass, mixed, points, features, MIXED)   # (P23)
-                if again:
-                    gather(position, hulls)
-                    gather(position, points)
+                gather_again(again, position, hulls, rigid)
+                gather_again(again, position, points, rigid)
                 aim_colliders(position, contact, rigid, touches, clock[NUMBER], h)
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
                 aim_hulls(mixed, points, contact, rigid, touches, MIXED, clock[NUMBER], h)

@@ -149,20 +149,27 @@ def separate(position, contact):
 
 @kernel
 def penetration(position, inverse_mass, contact):
-    """The deepest penetration of any particle [m] into any collider but meshes in its pose before this substep; 0 if none."""
+    """The deepest penetration of any particle [m] into any collider but meshes in its pose before this substep; 0 if none.
+
+    As contacts are listed: batch by batch, and only what a coarse test finds near is looked at.
+    """
     if contact is None:
         return 0.0
-    solids, radii, planes_only, deepest = contact.solids, contact.radius, contact.planes_only, 0.0
+    solids, radii, planes_only, near, deepest = contact.solids, contact.radius, contact.planes_only, contact.near, 0.0
     x, y, z = position[0], position[1], position[2]
     for s in range(solids.kind.size):
-        kind, extent = solids.kind[s], extent_of(solids.extent, s)
+        kind, extent, reach = solids.kind[s], extent_of(solids.extent, s), solids.reach[s]
         if kind == MESH:
             continue
         pose = pose_of(solids.origin_before, solids.rotation_before, s)
-        for k in range(inverse_mass.size):
-            if inverse_mass[k] > 0 and not (planes_only[k] and kind != PLANE):
-                px, py, pz = inward(x[k], y[k], z[k], pose)
-                deepest = max(deepest, radii[k] - surface(kind, extent, px, py, pz)[0])
+        for first in range(0, inverse_mass.size, near.size):
+            last = min(inverse_mass.size, first + near.size)
+            if not any_near(x[first:last], y[first:last], z[first:last], radii[first:last], kind, extent, pose, reach, 0.0, near):
+                continue
+            for k in range(first, last):
+                if near[k - first] and inverse_mass[k] > 0 and not (planes_only[k] and kind != PLANE):
+                    px, py, pz = inward(x[k], y[k], z[k], pose)
+                    deepest = max(deepest, radii[k] - surface(kind, extent, px, py, pz)[0])
     return deepest
 
 

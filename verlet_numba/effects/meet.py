@@ -19,6 +19,15 @@ def gather(position, hulls):
 
 
 @kernel
+def gather_again(again, position, hulls, rigid):
+    """The same before a later pass, for what answers as a whole: features follow their particles by themselves."""
+    if hulls is None or rigid is None:
+        return
+    if again:
+        gather_hulls(position, hulls)
+
+
+@kernel
 def move_hulls(hulls, contact, moving):
     """Bring the hulls of colliders that move to where those are."""
     if hulls is None or moving is None:

@@ -299,6 +299,7 @@ def shove(friction, rigid, touches):
         return
     first, second, order, island = touches.first, touches.second, touches.order, touches.island
     line, answer, given, twist, mass = touches.line, touches.answer, touches.given, rigid.twist, rigid.mass
+    world = rigid.size.size - 1
     for i in range(touches.islands[0]):
         begin, end = island[i], island[i + 1]
         for sweep in range(sweeps_of(end - begin)):
@@ -322,7 +323,8 @@ def shove(friction, rigid, touches):
                 jx, jy, jz = j * nx + df * px + dg * qx, j * ny + df * py + dg * qy, j * nz + df * pz + dg * qz
                 if jx != 0.0 or jy != 0.0 or jz != 0.0:
                     strike(twist, mass, a, line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
-                    strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
+                    if b != world:
+                        strike(twist, mass, b, line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
                     change = max(change, abs(jx), abs(jy), abs(jz))
                 largest = max(largest, push)
             if change <= SETTLED * largest:
@@ -330,37 +332,26 @@ def shove(friction, rigid, touches):
 
 
 @formula
-def sliding(f, g, xx, xy, yy, r):
-    """The impulse of size r that opposes the slide which it leaves; (f, g): the one that would leave none.
+def sliding(f, g, xx, xy, yy, r, length):
+    """The impulse of size r that opposes the slide which it leaves; (f, g): the one that would leave none, of this length.
 
-    With the responses K, its inverse A = (xx, xy, yy) and f0 = (f, g), the impulse f leaves the slide K (f - f0). That is
-    -a f where (1 + a A) f = f0, and a > 0 follows from |f| = r: 1/|f| is all but linear in a (More & Sorensen 1983).
+    With the responses K, its inverse A = (xx, xy, yy) and f0 = (f, g), the impulse p leaves the slide K (p - f0). That is
+    -a p where (1 + a A) p = f0, and a > 0 follows from |p| = r: 1/|p| is all but linear in a (More & Sorensen 1983).
+    p = P / D with P = f0 + a c, c the adjugate of A times f0, and D = det(1 + a A): one division and one root a step of Newton's
+        a <- a - L^2 (D - L / r) / (D' L^2 - D P . c), L = |P|, from a = 0.
     """
     if r == 0.0:
         return 0.0, 0.0
-    a, p, q = 0.0, f, g
+    trace, determinant, one = xx + yy, xx * yy - xy * xy, 1.0 / r
+    cx, cy = yy * f - xy * g, xx * g - xy * f
+    a, p, q, size = 0.0, f, g, length
     for _ in range(3):
-        length = math.sqrt(p * p + q * q)
-        u, v = applied(p, q, xx, xy, yy)
-        u, v = shifted(u, v, xx, xy, yy, a)
-        a += (1.0 / r - 1.0 / length) * length * length * length / (p * u + q * v)
-        p, q = shifted(f, g, xx, xy, yy, a)
-    share = r / math.sqrt(p * p + q * q)
+        d, slope, squared = 1.0 + a * (trace + a * determinant), trace + 2.0 * a * determinant, size * size
+        a -= squared * (d - size * one) / (slope * squared - d * (p * cx + q * cy))
+        p, q = f + a * cx, g + a * cy
+        size = math.sqrt(p * p + q * q)
+    share = r / size
     return share * p, share * q
-
-
-@formula
-def applied(p, q, xx, xy, yy):
-    """A (p, q)."""
-    return xx * p + xy * q, xy * p + yy * q
-
-
-@formula
-def shifted(p, q, xx, xy, yy, a):
-    """(1 + a A)^-1 (p, q)."""
-    x, y, z = 1.0 + a * xx, a * xy, 1.0 + a * yy
-    s = 1.0 / (x * z - y * y)
-    return (z * p - y * q) * s, (x * q - y * p) * s
 
 
 @formula
@@ -375,7 +366,7 @@ def grip(friction, f, g, p, q, uu, uv, vv, static, dynamic):
     x, y = f - (uu * p + uv * q), g - (uv * p + vv * q)
     length = math.sqrt(x * x + y * y)
     if length > static:
-        x, y = sliding(x, y, uu, uv, vv, min(dynamic, length))
+        x, y = sliding(x, y, uu, uv, vv, min(dynamic, length), length)
     return x, y
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import inlined, kernel
 from verlet_numba.buffers import (
     ANGULAR,
     CENTRE,
@@ -79,42 +79,43 @@ def in_space(position):
 @kernel
 def energies(row, position, snapshot, observed, h):
     """Sums over the particles of the file; velocities by central difference (Hairer, Lubich, Wanner 2003, eq. 1.4)."""
-    total, fastest, scale = 0.0, 0.0, 0.5 / h
-    for p in range(observed.scene_order.size):
-        k, m = observed.scene_order[p], observed.mass[p]
-        x, y, z = np.float64(snapshot.position[0, k]), np.float64(snapshot.position[1, k]), np.float64(snapshot.position[2, k])
-        u = (np.float64(position[0, k]) - snapshot.before[0, k]) * scale
-        v = (np.float64(position[1, k]) - snapshot.before[1, k]) * scale
-        w = (np.float64(position[2, k]) - snapshot.before[2, k]) * scale
-        square = u * u + v * v + w * w
-        row[KINETIC] += 0.5 * m * square
-        fastest = max(fastest, square)
-        row[MOMENTUM] += m * u
-        row[MOMENTUM + 1] += m * v
-        row[MOMENTUM + 2] += m * w
-        row[ANGULAR] += m * (y * w - z * v)
-        row[ANGULAR + 1] += m * (z * u - x * w)
-        row[ANGULAR + 2] += m * (x * v - y * u)
-        row[CENTRE] += m * x
-        row[CENTRE + 1] += m * y
-        row[CENTRE + 2] += m * z
-        total += m
-    potential(row, snapshot.position, observed.scene_order, observed.mass, observed.gravity)
-    row[TOTAL] = row[KINETIC] + row[POTENTIAL]
-    for axis in range(3):
-        row[CENTRE + axis] /= total if total > 0.0 else 1.0
-    row[SPEED_MAX] = math.sqrt(fastest)
+    (x, y, z), (u, v, w), (a, b, c) = rows(snapshot.position), rows(position), rows(snapshot.before)
+    order, mass, scale = observed.scene_order, observed.mass, 0.5 / h
+    total = fastest = kinetic = px = py = pz = lx = ly = lz = cx = cy = cz = 0.0
+    for p in range(order.size):
+        k, m = order[p], mass[p]
+        rx, ry, rz = np.float64(x[k]), np.float64(y[k]), np.float64(z[k])
+        vx, vy, vz = (np.float64(u[k]) - a[k]) * scale, (np.float64(v[k]) - b[k]) * scale, (np.float64(w[k]) - c[k]) * scale
+        square = vx * vx + vy * vy + vz * vz
+        total, fastest, kinetic = total + m, max(fastest, square), kinetic + 0.5 * m * square
+        px, py, pz = px + m * vx, py + m * vy, pz + m * vz
+        lx, ly, lz = lx + m * (ry * vz - rz * vy), ly + m * (rz * vx - rx * vz), lz + m * (rx * vy - ry * vx)
+        cx, cy, cz = cx + m * rx, cy + m * ry, cz + m * rz
+    whole = total if total > 0.0 else 1.0
+    row[KINETIC], row[POTENTIAL] = kinetic, potential(snapshot.position, order, mass, observed.gravity)
+    row[TOTAL], row[SPEED_MAX] = row[KINETIC] + row[POTENTIAL], math.sqrt(fastest)
+    row[MOMENTUM], row[MOMENTUM + 1], row[MOMENTUM + 2] = px, py, pz
+    row[ANGULAR], row[ANGULAR + 1], row[ANGULAR + 2] = lx, ly, lz
+    row[CENTRE], row[CENTRE + 1], row[CENTRE + 2] = cx / whole, cy / whole, cz / whole
+
+
+@inlined
+def rows(points):
+    """The three rows of points (3, n)."""
+    return points[0], points[1], points[2]
 
 
 @kernel
-def potential(row, position, order, mass, gravity):
-    """-m g . x, zero at the origin."""
+def potential(position, order, mass, gravity):
+    """The sum of -m g . x [J], zero at the origin."""
     if gravity is None:
-        return
+        return 0.0
+    energy = 0.0
     for p in range(order.size):
         k = order[p]
         along = gravity[0, p] * position[0, k] + gravity[1, p] * position[1, k] + gravity[2, p] * position[2, k]
-        row[POTENTIAL] -= mass[p] * along
+        energy -= mass[p] * along
+    return energy
 
 
 @kernel

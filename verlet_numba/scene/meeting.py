@@ -42,7 +42,7 @@ from verlet_numba.scene.sphere_trees import candidates_of, layered_of, spheres_o
 
 POINTS = {"feature": FEATURE, "body": BODY, "printed": PRINTED}
 MEETING_MARGIN = 0.02       # of the smallest hull's reach: how near two hulls are a contact
-LASTING = 4                 # substeps that a list of pairs of hulls shall last: longer ones hold more pairs
+LASTING = 4                 # substeps that a list of pairs of hulls shall last: longer ones hold more pairs; 0: the list is for one
 LISTING_MARGIN = 0.5        # of the deformable bodies' spacing: how near particles are listed as candidates
 
 
@@ -178,5 +178,6 @@ def meet_of(scene: Scene, found: list[Solid], hulls: Hulls, still: Array) -> Mee
     manifold = manifold_of(int(hulls.size.max()), FIRST_ROOM) if as_whole and rests_on_faces(hulls) else None
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
                 narrow_of(hulls), manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
-                min(scene.solver.substeps, LASTING), 1, 1 if scene.solver.broad_phase == "all_pairs" else None,
+                min(scene.solver.substeps, LASTING) if scene.solver.substeps > 1 else 0, 1,
+                1 if scene.solver.broad_phase == "all_pairs" else None,
                 ridges_of(found, hulls))
