@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.study import reader
-from verlet_numba.study.measures import UNITS, USUAL, MeasureError, measurable, measure, source
+from verlet_numba.study.measures import COLLIDERS, POSITIONS, UNITS, USUAL, MeasureError, measurable, measure, source
 from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
 
 AXES = "xyz"
@@ -107,8 +107,9 @@ def table(analyses: Sequence[Analysis]) -> Iterator[str]:
     for name, kind in names.items():
         label = f"{name} [{UNITS[kind]}]" if UNITS[kind] else name
         yield (f"{label:<{wide}}" + "".join(" " * 4 + cell(each.get(name), kind) for each in numbers)).rstrip()
-    if positions := [name for name in analyses[0].values if analyses[0].sources[name] == "positions"]:
-        yield f"from positions: {', '.join(positions)}; the rest as recorded"
+    for where in (POSITIONS, COLLIDERS):
+        if computed := [name for name, known in analyses[0].sources.items() if known == where]:
+            yield f"from {where}: {', '.join(computed)}"
 
 
 def cell(values: Array | None, kind: str) -> str:

@@ -3,7 +3,8 @@
 Of the whole scene the recorded observables are taken where the file has them: double precision, and velocities over
 substeps. Everything else comes from positions, in `from_positions`: a body alone, a file without observables, and what is
 never recorded. `source` tells which. Without recorded velocities those are central differences of frames, which see
-neither impacts nor what moves faster than a frame. Only a run can count contacts, relaxations, fallbacks and bodies at rest.
+neither impacts nor what moves faster than a frame. Only a run can count contacts, relaxations, fallbacks and bodies at rest,
+and only a run knows how deep bodies are in each other: positions tell how deep particles are in colliders.
 
 Frames are read in pieces of bounded size, so that memory does not grow with the file.
 """
@@ -29,7 +30,7 @@ COSTLY = ("self_intersections",)
 USUAL = tuple(name for name in UNITS if name not in COSTLY)
 SLOW = 0.01                     # m/s: below this all is at rest
 BLOCK_NUMBERS = 1_000_000       # coordinates of a piece of frames
-RECORDED, POSITIONS = "recorded", "positions"
+RECORDED, POSITIONS, COLLIDERS = "recorded", "positions", "positions, in colliders alone"
 
 
 class MeasureError(ValueError):
@@ -60,11 +61,13 @@ def measurable(trajectory: Trajectory, names: Iterable[str], body: str | None = 
 
 
 def source(trajectory: Trajectory, name: str, body: str | None = None, recorded: bool = True) -> str:
-    """Where a measure comes from: RECORDED or POSITIONS. Raises MeasureError if it cannot be taken."""
+    """Where a measure comes from: RECORDED, POSITIONS or COLLIDERS. Raises MeasureError if it cannot be taken."""
     if reason := _missing(trajectory, name, body, recorded):
         raise MeasureError(f"{trajectory.path}: {reason}")
     kept = "speed_max" if name == "rest_time" else name
-    return RECORDED if body is None and recorded and kept in trajectory.observables else POSITIONS
+    if body is None and recorded and kept in trajectory.observables:
+        return RECORDED
+    return COLLIDERS if name == "penetration_max" else POSITIONS
 
 
 def _missing(trajectory: Trajectory, name: str, body: str | None, recorded: bool) -> str:
