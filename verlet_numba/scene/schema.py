@@ -112,8 +112,9 @@ class Expect(Part):
     tolerance: Thickness = Field(default=0.0, description="by which the bound may be missed, in the measure's unit")
     start: Seconds = Field(default=0.0, alias="from", description="first time, s")
     end: Seconds | None = Field(default=None, alias="to", description="last time, s; the end of the run if left out")
-    body: Name | None = Field(default=None, description="the body that is measured, with all its copies; the whole scene if left "
-                                                           "out. Of a body penetration_max tells how deep its particles are in colliders")
+    body: Name | None = Field(
+        default=None, description="the body that is measured, all its copies; the whole scene if left out. Of a body "
+                                  "penetration_max tells how deep its particles are in colliders")
 
     def findings(self) -> Iterable[Finding]:
         bounds = [key for key in ("max", "min", "equal") if getattr(self, key) is not None]
