@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from verlet_numba.study.verify import prepare_all, run_case
+from verlet_numba.scene.prepare import prepare
+from verlet_numba.study.verify import IN_FULL, prepare_all, run_case
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes" / "hard").glob("*.yaml"))
@@ -36,6 +37,23 @@ def test_case_is_held(scene):
     case = run_case(prepare_all([scene])[0], quiet=True)
     assert case.verdicts or case.trouble
     assert case.held, "\n".join(case.lines())
+
+
+@pytest.mark.parametrize(("name", "change", "measure"), [
+    ("b04_cube_against_a_wall", "solver.substeps=1", "potential_energy"),
+    ("b05_overlaps", "bodies.b90.velocity=[-2, 0, 0]", "speed_max"),
+    ("b12_redundant_constraints", "bodies.more.sticks.0=[0, 1, 1.01]", "constraint_error_max"),
+    ("b15_exact_touch", "bodies.high.position.2=0.61", "speed_max"),
+    ("b24_nothing_moves", "bodies.rope.velocity=[1.0e-13, 0, 0]", "centre_of_mass"),
+    ("b31_slope", "bodies.above.friction=0.56", "speed_max"),
+    ("b33_chain", "bodies.link2.radius=0.001", "centre_of_mass"),
+    ("b37_dropped_cloth", "effects.self_collision=false", "self_intersections"),
+    ("b44_middle_axis", "solver.substeps=800", "kinetic_energy")])
+def test_bounds_notice_what_is_broken(name, change, measure):
+    """A case with one thing spoilt fails, and by the measure that is meant to see it."""
+    case = run_case(prepare(ROOT / "scenes" / "hard" / f"{name}.yaml", [*IN_FULL, change]), quiet=True)
+    assert not case.held
+    assert measure in [verdict.expected.measure for verdict in case.verdicts if not verdict.held], "\n".join(case.lines())
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.stem)
