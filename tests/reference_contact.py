@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import brentq
 
-from verlet_numba.effects.response import RECOVERY, SETTLED, SWEEPS
+from verlet_numba.effects.response import RECOVERY, SETTLED, SHARE, SMALL, SWEEPS
 
 
 def turned(axis, angle):
@@ -152,12 +152,12 @@ class Whole:
     """A rigid body that answers to its contacts with colliders as a whole.
 
     An impulse J [kg m] at the arm r moves the body by J/M and turns it by I^-1 (r x J). Impulses, normal and along the
-    surface, are found by Gauss-Seidel; a substep begins with the normal ones that the last one ended with.
+    surface, are found by Gauss-Seidel; a substep begins with those that the last one ended with.
     """
 
     def __init__(self, twin, particles):
         self.twin, self.particles = twin, particles
-        self.kept, self.overlap, self.met = {}, {}, {}      # by particle: collider and impulse; m not given back; substep
+        self.kept, self.overlap, self.met = {}, {}, {}      # by particle: collider, impulse, grip; m not given back; substep
         x = twin.x[particles]
         self.size = np.linalg.norm(x - x.mean(axis=0), axis=1).max()
 
@@ -170,10 +170,10 @@ class Whole:
         inertia = sum(mass * ((r @ r) * np.eye(3) - np.outer(r, r)) for mass, r in zip(m, x - self.centre, strict=True))
         self.inverse_inertia = np.linalg.inv(inertia)
         for contact in self.contacts:
-            solid, impulse = self.kept.get(contact.k, (None, 0.0))
-            recent = self.met.get(contact.k, -2) >= twin.number - 1
-            contact.impulse = impulse if solid is contact.solid and recent else 0.0
-            contact.grip, contact.kick = np.zeros(3), 0.0
+            solid, impulse, grip = self.kept.get(contact.k, (None, 0.0, np.zeros(3)))
+            known = solid is contact.solid and self.met.get(contact.k, -2) >= twin.number - 1
+            contact.impulse = contact.recalled = impulse if known else 0.0
+            contact.grip, contact.kick = known * (grip - (grip @ contact.normal) * contact.normal), 0.0
 
     def answer(self, contact):
         """Matrix (3, 3) of the displacement of the contact's point by an impulse there, 1/kg."""
@@ -182,11 +182,12 @@ class Whole:
         return np.eye(3) / self.mass - K @ self.inverse_inertia @ K
 
     def aim(self, contact):
-        """How far a contact shall rise. What overlapped when they met stays for a while."""
+        """How far a contact shall rise. What overlapped when they met stays for a while, most errors of a gap if it pushes on."""
         twin, n, k = self.twin, contact.normal, contact.k
         contact.arm, contact.moved = twin.x[k] - self.centre, twin.x[k] - contact.anchor
         gap, met = contact.height(twin.x), self.met.get(k, -2)
-        standing = 0.0 if contact.rebound > 0 else max(0.0, n @ contact.moved - gap)
+        error = 0.0 if contact.rebound > 0 else n @ contact.moved - gap
+        standing = max(0.0, error)
         if met < twin.number - 1:
             self.overlap[k] = standing
         elif met < twin.number:
@@ -194,7 +195,10 @@ class Whole:
         else:
             self.overlap[k] = min(standing, self.overlap[k])
         self.met[k] = twin.number
-        return -gap - self.overlap[k]
+        if contact.recalled == 0:
+            return -gap - self.overlap[k]
+        later = np.clip((1 - SHARE) * error, -SMALL * self.size, SMALL * self.size)
+        return -gap - (max(self.overlap[k], later) if error > 0 else later)
 
     def strike(self, contact, impulse):
         """The body moves and turns further by an impulse at a contact."""
@@ -238,7 +242,7 @@ class Whole:
         wishes = {id(contact): self.aim(contact) for contact in self.contacts}
         if first:
             for contact in self.contacts:
-                self.strike(contact, contact.impulse * contact.normal)
+                self.strike(contact, contact.impulse * contact.normal + contact.grip)
 
         def once(contact):
             n, u = contact.normal, self.risen(contact)
@@ -258,10 +262,10 @@ class Whole:
     def keep(self):
         """The impulses that the next substep begins with, of every particle the greatest."""
         for contact in self.contacts:
-            self.kept[contact.k] = (None, 0.0)
+            self.kept[contact.k] = (None, 0.0, np.zeros(3))
         for contact in self.contacts:
             if contact.impulse > self.kept[contact.k][1]:
-                self.kept[contact.k] = contact.solid, contact.impulse
+                self.kept[contact.k] = contact.solid, contact.impulse, contact.grip
             contact.push = contact.impulse / self.mass
 
     def rebound(self):

@@ -25,6 +25,7 @@ ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SP
 COLUMNS = 20
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
+POINTS = 8                                              # contacts of a pair of hulls, at most
 
 
 class Particles(NamedTuple):
@@ -198,7 +199,8 @@ class Contacts(NamedTuple):
     bound: Array                # (L,) double m; normal . position must not be below it
     anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
     push: Array                 # (L,) double m; displacement along the normal given so far
-    kept: Array                 # (n,) double kg m; impulse of the last substep on a rigid body's particle
+    kept: Array                 # (n,) double kg m; impulse of the last substep on a rigid body's particle, along the normal
+    grip: Array                 # (3, n) double kg m; and across it
     keeper: Array               # (n,) int 1; the collider that gave it
     overlap: Array              # (n,) double m; of a rigid body's particle with colliders when they met, not yet given back
     met: Array                  # (n,) int 1; substep in which it met one last
@@ -241,6 +243,7 @@ class Touches(NamedTuple):
     answer: Array               # (T, 9) double SI; wish, 1/response, static and dynamic friction, separation to leave with,
                                 # inverse of the responses across (uu, uv, vv), restitution
     given: Array                # (T, 4) double kg m; push, grip in the two directions across, kick along the normal
+    recalled: Array             # (T, 4) double kg m; what the last substep ended with: push, grip as a vector on the first entity
 
 
 class Rest(NamedTuple):
@@ -285,7 +288,7 @@ class Hulls(NamedTuple):
     local: Array                # (3, Q) double m; corners in the frame of their body or collider
     reach: Array                # (H,) double m; radius of the sphere about the centre that holds the hull, rounding included
     rounding: Array             # (H,) double m
-    flat: Array                 # (H,) int 1; 1: it has a face to rest on, and meets another such hull in several contacts
+    flat: Array                 # (H,) int 1; 1: it shall rest on its faces, and meets another such hull in several contacts
     graph: Array                # (H,) int 1; first row of the hull's corners in `neighbours`, -1: corners are scanned
     neighbours: Array           # (E + 1,) int 1; neighbours of the corner of row e: neighbour[neighbours[e]:neighbours[e + 1]]
     neighbour: Array            # (U,) int 1; corner number within the hull
@@ -299,7 +302,9 @@ class Pairs(NamedTuple):
     second: Array               # (M,) int 1
     axis: Array                 # (3, M) double 1; separating axis of the last substep, which starts the next; 0: none
     face: Array                 # (6, M) int 1; hit face of the last substep: corner numbers, three of either hull; -1: none
-    push: Array                 # (M,) double kg m; impulse of the last substep between them
+    push: Array                 # (M,) double kg m; impulse of the last substep between them, along the normal
+    points: Array               # (M,) int 1; how many contacts that was at
+    given: Array                # (M, 32) double kg m; at each: push, and grip as a vector on the first entity of the touch
     overlap: Array              # (M,) double m; what they overlapped when they met, as far as it is not yet given back
     met: Array                  # (M,) int 1; substep in which they met last
 

@@ -7,7 +7,7 @@ the loop: within it, every look into a buffer would count the references of its 
 
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
-from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
+from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.features import begin_features, part_features, rub_features
@@ -15,7 +15,7 @@ from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.impact import strike_bodies, strike_spheres
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, gather_again, move_hulls, pushing
-from verlet_numba.effects.mesh_contact import deepest_in_meshes, find_mesh_contacts
+from verlet_numba.effects.mesh_contact import deepest_in_meshes
 from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
 from verlet_numba.effects.response import (
@@ -33,7 +33,7 @@ from verlet_numba.effects.response import (
     respond,
     shove,
 )
-from verlet_numba.effects.rest import at_rest, depth_at_rest, free_of, hold, idle, settle, wake
+from verlet_numba.effects.rest import at_rest, depth_at_rest, find_at_colliders, hold, idle, settle, wake
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.soft import find_mixed, find_soft
 from verlet_numba.effects.spheres import begin_spheres, deepest, part_spheres, rub_spheres, touching_spheres
@@ -89,9 +89,8 @@ def advance(world, frames, budget):
                 gather(position, points)
                 clock[STAGE] = INTEGRATED
             while True:                                                     # once, and again where resting bodies wake
-                free = free_of(inverse_mass, rest)
-                if not (find_contacts(position, previous, free, contact)                # (P11 to P17)
-                        and find_mesh_contacts(position, previous, free, contact, meshes) and find_meetings(hulls, meet, rest)
+                if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
+                        and find_meetings(hulls, meet, rest)
                         and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
                     return FULL
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, moving):
@@ -127,7 +126,7 @@ def advance(world, frames, budget):
                 aim_hulls(meet, hulls, contact, rigid, touches, HULLS, clock[NUMBER], h)
                 aim_hulls(mixed, points, contact, rigid, touches, MIXED, clock[NUMBER], h)
                 respond(friction, rigid, touches)
-                begin_pass(again, rigid, touches)
+                begin_pass(again, friction, rigid, touches)
                 shove(friction, rigid, touches)
                 displace(position, inverse_mass, rigid)
                 if not again:

@@ -50,18 +50,18 @@ def find_meetings(hulls, meet, rest):
     horizon, margin = meet.horizon, meet.margin
     if refresh(hulls, meet.still, meet.pairs, meet.spare, meet.search, margin, horizon, meet.all_pairs) == FULL:
         return False
-    if not collide(hulls, meet.pairs, meet.meetings, meet.narrow, margin, meet.coherent, quiet_of(rest)):
+    if not collide_awake(hulls, meet, rest):
         return False
     straighten(hulls, meet.pairs, meet.meetings, meet.ridges)
     return several(hulls, meet.pairs, meet.meetings, meet.manifold)
 
 
 @kernel
-def quiet_of(rest):
-    """Which hulls need not meet each other; None: all do."""
+def collide_awake(hulls, meet, rest):
+    """The same of the pairs that are listed; those at rest need not meet each other."""
     if rest is None:
-        return None
-    return rest.quiet
+        return collide(hulls, meet.pairs, meet.meetings, meet.narrow, meet.margin, meet.coherent)
+    return collide(hulls, meet.pairs, meet.meetings, meet.narrow, meet.margin, meet.coherent, rest.quiet)
 
 
 @kernel

@@ -20,6 +20,8 @@ SWEEPS = 48                 # over an island, at most
 FEW_SWEEPS = 4              # over an island of more touches than
 FEW_TOUCHES = 128           # these: what they leave, the next substep takes up
 SETTLED = 1e-7              # of the largest impulse: a sweep that changes less is the last
+SHARE = 0.2                 # of what a gap is off: what touches that go on pushing correct in a substep, or all but
+SMALL = 1e-3                # of the size of the smaller
 RECOVERY = 2.5              # 1/s: an overlap in which two meet is given back at this many sizes of the smaller a second
 
 
@@ -31,7 +33,7 @@ def aim_colliders(position, contact, rigid, touches, number, h):
     x, y, z = position[0], position[1], position[2]
     particle, normal, bound, anchor = contact.particle, contact.normal, contact.bound, contact.anchor
     first, source, mass, reach, line, answer = touches.first, touches.source, rigid.mass, rigid.reach, touches.line, touches.answer
-    overlap, met, kick = contact.overlap, contact.met, rigid.kick
+    overlap, met, kick, recalled = contact.overlap, contact.met, rigid.kick, touches.recalled
     for t in range(touches.until[COLLIDERS]):
         c, e = source[t], first[t]
         k = particle[c]
@@ -45,10 +47,10 @@ def aim_colliders(position, contact, rigid, touches, number, h):
         line[t, 6] = line[t, 7] = line[t, 8] = 0.0
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
-        standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
-        overlap[k] = still_given(overlap[k], met[k], number, standing, RECOVERY * reach[e] * h)
+        standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
+        overlap[k] = still_given(overlap[k], met[k], number, max(0.0, standing), RECOVERY * reach[e] * h)
         met[k] = number
-        answer[t, 0] = -gap - overlap[k]
+        answer[t, 0] = -gap - left_for_later(standing, overlap[k], recalled[t, 0], SMALL * reach[e])
 
 
 @inlined
@@ -57,6 +59,24 @@ def still_given(overlap, met, number, standing, rate):
     left = standing
     if met >= number - 1:
         left = min(max(0.0, overlap - rate if met < number else overlap), standing)
+    return left
+
+
+@inlined
+def left_for_later(standing, overlap, push, most):
+    """Which part of what a gap was off at the substep's start stays [m]; standing: positive where they overlapped.
+
+    A touch that begins with the push of the last substep corrects a SHARE, of an overlap and of a gap alike, or all but `most`
+    of it. Else that push would be the sum of all errors so far: with the gap x, its speed v and the push e beyond what is
+    needed, a mode of an island of which the sweeps solve the part k in a substep goes as
+        e' = -k (SHARE x + v + e),  v' = e,  x' = v  a substep,  so  s^3 + k s^2 + k s + k SHARE = 0,
+    which dies away only if k > SHARE (Routh). Of a large heap, whose softest modes have a small k, contacts would open and
+    close for ever.
+    """
+    left = overlap
+    if push > 0.0:
+        rest = max(-most, min((1.0 - SHARE) * standing, most))
+        left = rest if standing < 0.0 else max(overlap, rest)
     return left
 
 
@@ -75,7 +95,7 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
     x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]
     first, second, source, line, answer = touches.first, touches.second, touches.source, touches.line, touches.answer
     mass, step, moved, kick, reach = rigid.mass, rigid.step, rigid.moved, rigid.kick, rigid.reach
-    overlap, met = meet.pairs.overlap, meet.pairs.met
+    overlap, met, recalled = meet.pairs.overlap, meet.pairs.met, touches.recalled
     world = reach.size - 1
     for t in range(touches.until[which - 1], touches.until[which]):
         m, a, b = source[t], first[t], second[t]
@@ -105,10 +125,10 @@ def aim_hulls(meet, hulls, contact, rigid, touches, which, number, h):
         line[t, 6], line[t, 7], line[t, 8] = qx, qy, qz
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         p = pair[m]
-        standing = 0.0 if answer[t, 4] > 0.0 else max(0.0, nx * sx + ny * sy + nz * sz - gap)
-        overlap[p] = still_given(overlap[p], met[p], number, standing, RECOVERY * size * h)
+        standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
+        overlap[p] = still_given(overlap[p], met[p], number, max(0.0, standing), RECOVERY * size * h)
         met[p] = number
-        answer[t, 0] = -gap - overlap[p]
+        answer[t, 0] = -gap - left_for_later(standing, overlap[p], recalled[t, 0], SMALL * size)
 
 
 @inlined
@@ -201,29 +221,44 @@ def recall_colliders(contact, rigid, touches, number):
     touches.given[:touches.until[-1]] = 0.0
     if contact is None:
         return
-    particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
-                                                    touches.source)
-    met = contact.met
+    particle, solid, kept, grip, keeper, met = (contact.particle, contact.solid, contact.kept, contact.grip, contact.keeper,
+                                                contact.met)
+    source, recalled = touches.source, touches.recalled
     for t in range(touches.until[COLLIDERS]):
         k = particle[source[t]]
-        if keeper[k] == solid[source[t]] and met[k] >= number - 1:
-            given[t, 0] = kept[k]
+        share = 1.0 if keeper[k] == solid[source[t]] and met[k] >= number - 1 else 0.0
+        recalled[t, 0] = share * kept[k]
+        for axis in range(3):
+            recalled[t, 1 + axis] = share * grip[axis, k]
 
 
 @kernel
 def recall_hulls(meet, rigid, touches, which, number):
-    """The same between hulls: the push of a pair is shared among its contacts, which stand side by side."""
+    """The same between hulls: a pair's contacts stand side by side; where their number has changed they share what it was."""
     if meet is None or rigid is None:
         return
-    pair, source, given, push, met = meet.meetings.pair, touches.source, touches.given, meet.pairs.push, meet.pairs.met
+    pair, source, recalled = meet.meetings.pair, touches.source, touches.recalled
+    points, learnt, met = meet.pairs.points, meet.pairs.given, meet.pairs.met
     begin, end = touches.until[which - 1], touches.until[which]
     while begin < end:
         p, last = pair[source[begin]], begin + 1
         while last < end and pair[source[last]] == p:
             last += 1
-        for t in range(begin, last):
-            given[t, 0] = push[p] / (last - begin) if met[p] >= number - 1 else 0.0
+        known = points[p] if met[p] >= number - 1 else 0
+        for column in range(4):
+            whole = 0.0
+            for k in range(known):
+                whole += learnt[p, 4 * k + column]
+            for t in range(begin, last):
+                recalled[t, column] = learnt[p, 4 * (t - begin) + column] if known == last - begin else whole / (last - begin)
         begin = last
+
+
+@inlined
+def gripping(given, line, t):
+    """The impulse across of touch t, on its first entity."""
+    f, g = given[t, 1], given[t, 2]
+    return f * line[t, 12] + g * line[t, 15], f * line[t, 13] + g * line[t, 16], f * line[t, 14] + g * line[t, 17]
 
 
 @kernel
@@ -233,13 +268,15 @@ def keep_colliders(contact, rigid, touches):
         return
     particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
                                                     touches.source)
-    push, w = contact.push, rigid.mass
+    push, w, grip, line = contact.push, rigid.mass, contact.grip, touches.line
     for t in range(touches.until[COLLIDERS]):
-        kept[particle[source[t]]] = 0.0
+        k = particle[source[t]]
+        kept[k] = grip[0, k] = grip[1, k] = grip[2, k] = 0.0
     for t in range(touches.until[COLLIDERS]):
-        c = source[t]
-        if given[t, 0] > kept[particle[c]]:
-            kept[particle[c]], keeper[particle[c]] = given[t, 0], solid[c]
+        c, k = source[t], particle[source[t]]
+        if given[t, 0] > kept[k]:
+            kept[k], keeper[k] = given[t, 0], solid[c]
+            grip[0, k], grip[1, k], grip[2, k] = gripping(given, line, t)
         push[c] = given[t, 0] * w[touches.first[t], 0]
 
 
@@ -249,14 +286,21 @@ def keep_hulls(meet, rigid, touches, which):
     if meet is None or rigid is None:
         return
     pair, source, given, push = meet.meetings.pair, touches.source, touches.given, meet.pairs.push
+    points, learnt, line = meet.pairs.points, meet.pairs.given, touches.line
     for t in range(touches.until[which - 1], touches.until[which]):
-        push[pair[source[t]]] = 0.0
+        p = pair[source[t]]
+        push[p], points[p] = 0.0, 0
     for t in range(touches.until[which - 1], touches.until[which]):
-        push[pair[source[t]]] += given[t, 0]
+        p = pair[source[t]]
+        k = 4 * points[p]
+        push[p] += given[t, 0]
+        points[p] += 1
+        learnt[p, k] = given[t, 0]
+        learnt[p, k + 1], learnt[p, k + 2], learnt[p, k + 3] = gripping(given, line, t)
 
 
 @kernel
-def begin_pass(again, rigid, touches):
+def begin_pass(again, friction, rigid, touches):
     """Nothing has been given in this pass, but what the first one recalls."""
     if rigid is None:
         return
@@ -265,12 +309,27 @@ def begin_pass(again, rigid, touches):
     if again:
         return
     first, second, line, given, twist, mass = touches.first, touches.second, touches.line, touches.given, rigid.twist, rigid.mass
+    recalled = touches.recalled
+    grip_again(friction, touches)
     for t in range(touches.until[-1]):
-        j = given[t, 0]
+        j = given[t, 0] = recalled[t, 0]
         if j > 0.0:
-            jx, jy, jz = j * line[t, 0], j * line[t, 1], j * line[t, 2]
+            fx, fy, fz = gripping(given, line, t)
+            jx, jy, jz = j * line[t, 0] + fx, j * line[t, 1] + fy, j * line[t, 2] + fz
             strike(twist, mass, first[t], line[t, 3], line[t, 4], line[t, 5], jx, jy, jz)
             strike(twist, mass, second[t], line[t, 6], line[t, 7], line[t, 8], -jx, -jy, -jz)
+
+
+@kernel
+def grip_again(friction, touches):
+    """What gripped in the last substep grips now, as far as it is across the line still."""
+    if friction is None:
+        return
+    line, given, recalled = touches.line, touches.given, touches.recalled
+    for t in range(touches.until[-1]):
+        x, y, z = recalled[t, 1], recalled[t, 2], recalled[t, 3]
+        given[t, 1] = line[t, 12] * x + line[t, 13] * y + line[t, 14] * z
+        given[t, 2] = line[t, 15] * x + line[t, 16] * y + line[t, 17] * z
 
 
 @kernel

@@ -92,6 +92,7 @@ def carry(centre, pairs, spare, before, listed):
     old_first, old_second, old_axis, old_face = pairs.first, pairs.second, pairs.axis, pairs.face
     first, second, axis, face = spare.first, spare.second, spare.axis, spare.face
     old_push, old_overlap, old_met, push, overlap, met = pairs.push, pairs.overlap, pairs.met, spare.push, spare.overlap, spare.met
+    old_points, old_given, points, given = pairs.points, pairs.given, spare.points, spare.given
     k = 0
     for m in range(listed):
         i, j = first[m], second[m]
@@ -103,9 +104,12 @@ def carry(centre, pairs, spare, before, listed):
                 axis[row, m] = old_axis[row, k]
             for row in range(6):
                 face[row, m] = old_face[row, k]
+            points[m] = old_points[k]
+            copy(old_given[k], given[m], 4 * points[m])
         else:
             push[m], overlap[m], met[m] = 0.0, 0.0, NEVER
             axis[0, m], axis[1, m], axis[2, m] = x[i] - x[j], y[i] - y[j], z[i] - z[j]
+            points[m] = 0
             for row in range(6):
                 face[row, m] = -1
 
@@ -119,6 +123,9 @@ def replace(pairs, spare, listed):
     copy(spare.push, pairs.push, listed)
     copy(spare.overlap, pairs.overlap, listed)
     copy(spare.met, pairs.met, listed)
+    copy(spare.points, pairs.points, listed)
+    for m in range(listed):
+        copy(spare.given[m], pairs.given[m], 4 * spare.points[m])
     for row in range(3):
         copy(spare.axis[row], pairs.axis[row], listed)
     for row in range(6):

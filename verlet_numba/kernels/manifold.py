@@ -27,6 +27,7 @@ Lengths are relative to the hulls, coordinates to the contact: results move and 
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
+from verlet_numba.buffers import POINTS
 from verlet_numba.kernels.polygons import apart, arrange, far_apart, overlap, side_by_side, thin, trim
 
 NEAR = 0.01         # of a hull's reach: how near corners are to the support plane, and how near to each other to be one
@@ -34,7 +35,6 @@ PARALLEL = 1e-4     # of the smaller reach: how far edges side by side may be ap
 FLAT = 1e-3         # of the smaller reach: a point as near to the line through its neighbours spans nothing
 SLACK = 1e-9        # of the smaller reach: how far a corner may be outside of an edge that it touches
 ROUNDING = 1e-15    # of coordinates: what they are off by, and more
-POINTS = 8          # of a pair, at most
 
 
 @kernel
@@ -90,7 +90,7 @@ def widen(hulls, pairs, meetings, scratch):
 def mark(hulls, pairs, meetings, points):
     """Set points[t] to 1 where both hulls have several corners near their support planes, else to 0. Whether any have.
 
-    Hulls without a face to rest on keep their single contact unseen. The contact's own points lie on the support planes: one
+    Hulls that need not rest on a face keep their single contact unseen. The contact's own points lie on the support planes: one
     scan of either hull tells.
     """
     x, y, z = hulls.corner[0], hulls.corner[1], hulls.corner[2]

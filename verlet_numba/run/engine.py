@@ -128,7 +128,7 @@ class State:
         if contact is not None:
             solids = contact.solids
             arrays += [solids.origin, solids.rotation, solids.origin_before, solids.rotation_before, contact.listed,
-                       contact.particle, contact.push, contact.kept, contact.keeper, contact.overlap, contact.met]
+                       contact.particle, contact.push, contact.kept, contact.grip, contact.keeper, contact.overlap, contact.met]
         if meet is not None:
             search, meetings = meet.search, meet.meetings
             arrays += [*meet.pairs, search.made, search.anchor, search.extent, search.last, search.turn,

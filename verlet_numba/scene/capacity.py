@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verlet_numba.buffers import Array, Effects, Hulls, Manifold, Meetings, Narrow, Pairs, Search, gate
+from verlet_numba.buffers import POINTS, Array, Effects, Hulls, Manifold, Meetings, Narrow, Pairs, Search, gate
 from verlet_numba.scene.colliders import room
 from verlet_numba.scene.rigid import touches_of, with_room
 from verlet_numba.scene.sphere_trees import candidates_of
@@ -27,7 +27,8 @@ def real(*shape: int) -> Array:
 
 def pairs_of(room: int) -> Pairs:
     """Room for so many pairs."""
-    return Pairs(whole(1), whole(room), whole(room), real(3, room), whole(6, room), real(room), real(room), whole(room))
+    return Pairs(whole(1), whole(room), whole(room), real(3, room), whole(6, room), real(room), whole(room),
+                 real(room, 4 * POINTS), real(room), whole(room))
 
 
 def meetings_of(room: int) -> Meetings:
@@ -102,5 +103,5 @@ def copied(pairs: Pairs, capacity: int) -> Pairs:
     larger = pairs_of(capacity)
     larger.listed[:] = pairs.listed
     for old, new in zip(pairs[1:], larger[1:], strict=True):
-        new[..., :old.shape[-1]] = old
+        new[tuple(map(slice, old.shape))] = old
     return larger

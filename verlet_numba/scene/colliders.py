@@ -138,7 +138,7 @@ def contacts(placed: Solids, bodies: list[Body], numbering: Numbering, size: int
     answers = belongs if whole else np.full(size, -1)
     return Contacts(placed, gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
                     gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
-                    gate(np.zeros(size), np.float64), gate(np.zeros(size), np.int64),
+                    gate(np.zeros(size), np.float64), gate(np.zeros((3, size)), np.float64), gate(np.zeros(size), np.int64),
                     gate(np.zeros(size), np.float64), gate(np.full(size, -2), np.int64))
 
 

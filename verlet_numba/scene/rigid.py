@@ -47,7 +47,7 @@ def reach_of(body: Body) -> float:
 def touches_of(room: int, entities: int) -> Touches:
     """Room for so many touches between entities."""
     numbers = [gate(np.zeros(length), np.int64) for length in (3, 1, room, room, room, room, room + 1, entities)]
-    return Touches(*numbers, *(gate(np.zeros((room, columns)), np.float64) for columns in (18, 9, 4)))
+    return Touches(*numbers, *(gate(np.zeros((room, columns)), np.float64) for columns in (18, 9, 4, 4)))
 
 
 def with_room(rigid: Rigid, more: int) -> Rigid:

@@ -8,12 +8,14 @@ from scipy.spatial.transform import Rotation
 from verlet_numba.effects.meet import find_meetings, gather
 from verlet_numba.effects.response import (
     RECOVERY,
+    SHARE,
     aim_colliders,
     aim_hulls,
     begin_pass,
     displace,
     keep_hulls,
     kick_back,
+    left_for_later,
     link,
     rebound,
     recall_colliders,
@@ -67,7 +69,7 @@ class Case:
 
     def solved(self):
         """The particles are displaced by what the touches give."""
-        begin_pass(0, self.rigid, self.touches)
+        begin_pass(0, self.effects.friction, self.rigid, self.touches)
         shove(self.effects.friction, self.rigid, self.touches)
         displace(self.x, self.w, self.rigid)
         return self
@@ -207,6 +209,44 @@ def test_an_overlap_at_the_start_is_given_back_slowly_and_leaves_no_speed():
     ids=["shrinks", "no more than stands", "is gone", "second pass", "met anew", "met apart"])
 def test_what_is_left_of_an_overlap(overlap, met, standing, left):
     assert still_given(overlap, met, 10, standing, 0.1) == pytest.approx(left)
+
+
+@pytest.mark.parametrize(("standing", "overlap", "push", "left"), [
+    (0.5, 0.0, 0.0, 0.0), (0.5, 0.4, 0.0, 0.4), (-0.5, 0.0, 0.0, 0.0), (0.5, 0.0, 1.0, 0.5 * (1 - SHARE)), (0.5, 0.45, 1.0, 0.45),
+    (-0.5, 0.0, 1.0, -0.5 * (1 - SHARE)),
+    (9.0, 0.0, 1.0, 0.6), (-9.0, 0.0, 1.0, -0.6), (9.0, 0.7, 1.0, 0.7)],
+    ids=["met anew", "overlapped then", "closes", "pushes on", "is slower still", "is open", "is deep", "is wide", "is both"])
+def test_what_is_left_of_a_gaps_error(standing, overlap, push, left):
+    assert left_for_later(standing, overlap, push, 0.6) == pytest.approx(left)
+
+
+def test_a_substep_begins_with_what_every_contact_gave_in_the_last():
+    """Push and grip, whatever way the two directions across lie; and if the contacts are others, with their sum."""
+    boxes = [{**CRATE, "name": name, "rotation": {"axis": [1, 0, 0], "degrees": 0}, "position": [x, 0.01 * x, 0]}
+             for name, x in (("a", 0), ("b", 0.3))]
+    case = Case(boxes)
+    case.shift(0, [0.001, 0.0003, 0.0001])
+    case.found(number=0).solved()
+    given, line = case.given.copy(), case.line.copy()
+    assert case.count == 4
+    assert given[:, 0].max() > 0
+    assert np.abs(given[:, 1:3]).max() > 0
+    keep_hulls(case.meet, case.rigid, case.touches, HULLS)
+    case.found(number=1)
+    begin_pass(0, case.effects.friction, case.rigid, case.touches)
+    np.testing.assert_allclose(case.given[:, 0], given[:, 0], rtol=1e-12)
+    for t, row in enumerate(case.line):
+        grip = given[t, 1] * line[t, 12:15] + given[t, 2] * line[t, 15:18]
+        across = grip - (grip @ row[:3]) * row[:3]
+        again = case.given[t, 1] * row[12:15] + case.given[t, 2] * row[15:18]
+        np.testing.assert_allclose(again, across, atol=1e-12 * np.abs(given).max())
+    p = case.meet.meetings.pair[case.touches.source[0]]
+    case.meet.pairs.points[p] = 3
+    three = case.meet.pairs.given[p, :12].reshape(3, 4).sum(axis=0)
+    recall_hulls(case.meet, case.rigid, case.touches, HULLS, 1)
+    np.testing.assert_allclose(case.touches.recalled[:4], np.broadcast_to(three / 4, (4, 4)), rtol=1e-12)
+    recall_hulls(case.meet, case.rigid, case.touches, HULLS, 3)
+    assert np.abs(case.touches.recalled[:4]).max() == 0
 
 
 def test_a_body_turns_exactly():

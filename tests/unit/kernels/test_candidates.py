@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verlet_numba.buffers import Hulls
+from verlet_numba.buffers import POINTS, Hulls
 from verlet_numba.kernels.candidates import FULL, KEPT, RENEWED, SLACK, refresh
 from verlet_numba.scene.capacity import pairs_of
 from verlet_numba.scene.capacity import search_of as search_for
@@ -91,6 +91,11 @@ def test_both_searches_list_the_same():
         assert lists[0]
 
 
+def impulses(pairs, m):
+    """What pair m pushed and gripped at each of its contacts."""
+    return pairs.given[m, :4 * pairs.points[m]].copy()
+
+
 def test_pairs_that_stay_keep_what_they_learnt():
     found, velocity = crowd(3, 150)
     found.refresh()
@@ -99,15 +104,18 @@ def test_pairs_that_stay_keep_what_they_learnt():
     for _ in range(30):
         n = found.pairs.listed[0]
         found.pairs.axis[:, :n], found.pairs.face[:, :n] = rng.normal(size=(3, n)), rng.integers(0, 9, (6, n))
-        learnt = {pair: (found.pairs.axis[:, m].copy(), found.pairs.face[:, m].copy()) for m, pair in enumerate(found.listed)}
+        found.pairs.points[:n], found.pairs.given[:n] = rng.integers(0, POINTS + 1, n), rng.normal(size=(n, 4 * POINTS))
+        learnt = {pair: (found.pairs.axis[:, m].copy(), found.pairs.face[:, m].copy(), impulses(found.pairs, m))
+                  for m, pair in enumerate(found.listed)}
         found.hulls.centre[:] += 3 * velocity
         found.refresh()
         assert found.listed == sorted(set(found.listed))
         for m, (i, j) in enumerate(found.listed):
             difference = found.hulls.centre[:, i] - found.hulls.centre[:, j]
-            axis, face = learnt.get((i, j), (difference, np.full(6, -1)))
+            axis, face, given = learnt.get((i, j), (difference, np.full(6, -1), np.zeros(0)))
             np.testing.assert_array_equal(found.pairs.axis[:, m], axis)
             np.testing.assert_array_equal(found.pairs.face[:, m], face)
+            np.testing.assert_array_equal(impulses(found.pairs, m), given)
             stayed, appeared = stayed + ((i, j) in learnt), appeared + ((i, j) not in learnt)
     assert min(stayed, appeared) > 30
 
@@ -125,7 +133,7 @@ def test_full_loses_nothing_and_more_room_is_all_it_needs():
     results = []
     while (result := found.refresh()) == FULL:
         for value, before in zip((*found.pairs, *found.search[:3]), kept, strict=True):
-            np.testing.assert_array_equal(value[..., :before.shape[-1]], before)
+            np.testing.assert_array_equal(value[tuple(map(slice, before.shape))], before)
         results.append(result)
         grow(found)
         kept = [value.copy() for value in (*found.pairs, *found.search[:3])]
@@ -143,7 +151,7 @@ def grow(found):
     size = 2 * found.pairs.first.size
     wider = room_for(size)
     for old, new in zip(found.pairs, wider, strict=True):
-        new[..., :old.shape[-1]] = old
+        new[tuple(map(slice, old.shape))] = old
     found.pairs, found.spare = wider, room_for(size)
     found.search = found.search._replace(code=np.zeros(size, np.int64))
 

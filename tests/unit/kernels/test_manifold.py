@@ -11,8 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import Hulls, Manifold, Meetings, Pairs
-from verlet_numba.kernels.manifold import FLAT, NEAR, PARALLEL, POINTS, widen
+from verlet_numba.buffers import POINTS, Hulls, Manifold, Meetings, Pairs
+from verlet_numba.kernels.manifold import FLAT, NEAR, PARALLEL, widen
 
 UP = np.array([0.0, 0.0, 1.0])
 BOX = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
@@ -83,7 +83,7 @@ def scene(pairs, capacity=100):
                               "local": np.zeros((3, 0)), "flat": np.ones(len(bodies), int)})
     m = len(pairs)
     listed = Pairs(np.array([m]), 2 * np.arange(m), 2 * np.arange(m) + 1, np.zeros((3, m)), np.full((6, m), -1), np.zeros(m),
-                   np.zeros(m), np.zeros(m, int))
+                   np.zeros(m, int), np.zeros((m, 4 * POINTS)), np.zeros(m), np.zeros(m, int))
     meetings = Meetings(np.array([m]), np.full(capacity, -1), np.full((6, capacity), -1), np.full((6, capacity), np.nan),
                         np.full((3, capacity), np.nan), np.full(capacity, np.nan), np.zeros(capacity),
                         np.zeros((2, capacity)))
