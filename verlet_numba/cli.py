@@ -17,6 +17,7 @@ FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings, no summary.")
 VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Say more about what is done.")
 
@@ -51,7 +52,7 @@ def cli(debug: bool) -> None:
 @click.option("--frames", "count", type=click.IntRange(0), help="Frames after frame 0, instead of the scene's duration.")
 @click.option("--threads", type=click.IntRange(1), default=2, show_default=True,
               help="Most threads to use: with 2, frames are written while the next are simulated.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@OVERWRITE
 @AS_JSON
 @QUIET
 @VERBOSE
@@ -140,10 +141,11 @@ def schema() -> None:
 @QUIET
 def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
     """Compile what SCENES (default: those of the paper) need into the cache, without simulating."""
-    from verlet_numba.run.warm import paper_scenes, warm_up
+    from verlet_numba.run.warm import warm_up
+    from verlet_numba.scene.installed import installed
     from verlet_numba.scene.prepare import prepare
 
-    for scene in scenes or paper_scenes():
+    for scene in scenes or installed("paper"):
         seconds, cache = warm_up(prepare(scene))
         if not quiet:
             click.echo(f"{scene}: ready after {seconds:.1f} s, machine code in {cache}")
@@ -153,7 +155,7 @@ def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
 @click.argument("trajectory", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="A .png contact sheet or a .gif.")
 @click.option("--frames", help="Frames to show: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@OVERWRITE
 def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) -> None:
     """Draw TRAJECTORY without a display: a sheet of pictures or an animation."""
     refuse_existing(output, overwrite)
@@ -208,6 +210,88 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
         click.echo(report.solver_yaml(best, prepared.scene.solver.model_dump(exclude_unset=True)))
     if target_error is not None and best is None:
         raise click.ClickException(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+
+
+@cli.command()
+@click.argument("places", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="FILE_OR_FOLDER...")
+@click.option("--measure", "names", multiple=True, metavar="NAME",
+              help="A measure to take; may be repeated. [default: all but self_intersections]")
+@click.option("--body", metavar="NAME", help="Measure this body alone, all copies, or the copy NAME.K.")
+@click.option("--recompute", is_flag=True, help="From positions alone, not what the run recorded.")
+@AS_JSON
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write every frame's measures to this file.")
+@click.option("--plot", "picture", type=click.Path(path_type=Path), help="Draw their course to this .png, .svg or .pdf.")
+@OVERWRITE
+def analyze(places: tuple[Path, ...], names: tuple[str, ...], body: str | None, recompute: bool, as_json: bool,
+            csv_file: Path | None, picture: Path | None, overwrite: bool) -> None:
+    """Measure trajectories, side by side, from their files alone: energies, momenta, errors, penetration, rest ..."""
+    from verlet_numba.study import analyze as study
+
+    for output in (csv_file, picture):
+        if output is not None:
+            refuse_existing(output, overwrite)
+    if picture is not None and picture.suffix.lower() not in study.PICTURES:
+        raise Misuse(f"{picture}: cannot draw {picture.suffix or 'a file without suffix'}; use {', '.join(study.PICTURES)}")
+    try:
+        found = [study.analyze(file, names, body, recorded=not recompute) for file in study.trajectories(places)]
+    except study.MeasureError as error:
+        raise Misuse(str(error)) from error
+    if csv_file is not None:
+        study.write_csv(found, csv_file)
+    if picture is not None:
+        study.plot(found, picture)
+    if as_json:
+        print_json({"files": [each.as_dict() for each in found]})
+    else:
+        click.echo("\n".join(study.table(found)))
+
+
+@cli.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@click.option("--tolerance", type=click.FloatRange(0), default=0.0, show_default=True, help="Differences up to this are none, m.")
+def compare(a: Path, b: Path, tolerance: float) -> None:
+    """Find the first frame, body and particle where trajectories A and B differ; exit 0 if there is none, 1 if there is one."""
+    from verlet_numba.study import reader
+    from verlet_numba.study.compare import compare as differ
+
+    with reader.open(a) as one, reader.open(b) as other:
+        difference = differ(one, other, tolerance)
+        frames = one.frames
+    if difference is not None:
+        click.echo(str(difference))
+        raise SystemExit(FAILED)
+    click.echo(f"no difference in {frames} frames" + (f" by more than {tolerance:g} m" if tolerance else ""))
+
+
+@cli.command()
+@click.argument("places", type=click.Path(path_type=Path), nargs=-1, metavar="[SCENE_OR_FOLDER]...")
+@AS_JSON
+@QUIET
+def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
+    """Run scenes that state what they `expect` (default: the installed ones) and hold them to it; exit 1 if one fails."""
+    from verlet_numba.scene.installed import installed
+    from verlet_numba.study.verify import prepare_all, run_case, scenes_in
+
+    scenes = prepare_all(scenes_in(places or installed()))
+    for scene in scenes:
+        if not scene.scene.expect and Path(scene.loaded.source.name) in places:
+            raise Misuse(f"{scene.loaded.source.name} states nothing under `expect`")
+    cases = []
+    for scene in scenes:
+        if scene.scene.expect:
+            cases.append(run_case(scene, quiet=quiet or as_json))
+            if not as_json:
+                click.echo("\n".join(cases[-1].lines()))
+            if cases[-1].signal is not None:
+                raise SystemExit(128 + cases[-1].signal)
+    failed = [case.scene for case in cases if not case.held]
+    if as_json:
+        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed)})
+    else:
+        click.echo(f"{len(cases)} cases, {len(cases) - len(failed)} held" + (f", failed: {', '.join(failed)}" if failed else ""))
+    if failed:
+        raise SystemExit(FAILED)
 
 
 def chosen(frames: str | None) -> list[int | slice] | None:

@@ -10,7 +10,7 @@ from PIL import Image
 
 from verlet_numba import __version__
 
-COMMANDS = ("run", "check", "plan", "schema", "warm", "render")
+COMMANDS = ("run", "check", "plan", "schema", "warm", "render", "analyze", "compare", "verify")
 HEAVY = {"numba", "llvmlite", "scipy", "trimesh", "matplotlib", "h5py"}
 # A process small enough that the memory it hands down to its child does not count.
 PEAK_MEMORY = """\
@@ -168,7 +168,8 @@ def test_help_of_everything(verlet):
     assert verlet("run", "-h").stdout == verlet("run", "--help").stdout
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["check"], ["plan"], ["schema"]], ids=" ".join)
+@pytest.mark.parametrize("arguments", [["--help"], *([command, "--help"] for command in COMMANDS), ["check"], ["plan"], ["schema"]],
+                         ids=" ".join)
 def test_quick_commands_import_nothing_heavy(verlet, mixed, arguments):
     scene = [mixed.scene] if arguments[0] in ("check", "plan") else []
     assert imported(*arguments, *map(str, scene)) & HEAVY == set()

@@ -1,4 +1,4 @@
-"""Every scene of the repository is good, without a word of warning that is not known, and runs."""
+"""Every scene of the repository is good, without a word of warning that is not known, and runs; tests/hard has the hard ones."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import pytest
 from verlet_numba.scene.prepare import prepare
 
 SCENES = Path(__file__).parents[2] / "scenes"
-FILES = sorted(path.relative_to(SCENES) for path in SCENES.rglob("*.yaml"))
+FILES = sorted(path.relative_to(SCENES) for path in SCENES.rglob("*.yaml") if path.parent.name != "hard")
 KNOWN = ("not simulated yet",)      # bodies pass through each other: the scenes say so themselves
 
 

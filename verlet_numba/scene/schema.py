@@ -17,6 +17,9 @@ Measure = Literal[
     "constraint_error_max", "constraint_error_rms", "penetration_max", "contacts", "relaxations", "fallbacks",
     "resting", "speed_max", "rest_time", "orientation_flips", "self_intersections", "outside"]
 
+COUNTED = ("contacts", "relaxations", "fallbacks", "resting")
+"""Measures that a run counts for the whole scene."""
+
 MAX_FRAMES = 100_000_000
 
 PAPER: dict[str, Any] = {
@@ -109,7 +112,9 @@ class Expect(Part):
     tolerance: Thickness = Field(default=0.0, description="by which the bound may be missed, in the measure's unit")
     start: Seconds = Field(default=0.0, alias="from", description="first time, s")
     end: Seconds | None = Field(default=None, alias="to", description="last time, s; the end of the run if left out")
-    body: Name | None = Field(default=None, description="the body that is measured; the whole scene if left out")
+    body: Name | None = Field(
+        default=None, description="the body that is measured, all its copies; the whole scene if left out. Of a body "
+                                  "penetration_max tells how deep its particles are in colliders")
 
     def findings(self) -> Iterable[Finding]:
         bounds = [key for key in ("max", "min", "equal") if getattr(self, key) is not None]
@@ -117,6 +122,8 @@ class Expect(Part):
             yield (), f"needs exactly one of max, min and equal, but has {' and '.join(bounds) or 'none'}"
         if self.end is not None and self.end < self.start:
             yield ("to",), f"{self.end:g} s is before `from`, {self.start:g} s"
+        if self.body is not None and self.measure in COUNTED:
+            yield ("body",), f"{self.measure} is counted for the whole scene, not for a body"
 
 
 class Reference(Part):

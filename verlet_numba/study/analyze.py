@@ -1,0 +1,176 @@
+"""Measures of trajectories as a table, JSON, CSV and a picture of their course."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from verlet_numba.study import reader
+from verlet_numba.study.measures import COLLIDERS, POSITIONS, UNITS, USUAL, MeasureError, measurable, measure, source
+from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
+
+AXES = "xyz"
+WIDTH = 12              # of a column of figures
+__all__ = ["PICTURES", "Analysis", "MeasureError", "analyze", "plot", "table", "trajectories", "write_csv"]
+
+LOGARITHMIC = ("constraint_error_max", "constraint_error_rms", "penetration_max", "speed_max")
+PICTURES = (".png", ".svg", ".pdf")
+
+
+class Analysis(NamedTuple):
+    """The measures of one trajectory file, or of a body in it."""
+
+    file: str
+    status: str
+    time: Array                     # (T,) s
+    values: dict[str, Array]        # (T,), of vectors (T, 3); rest_time ()
+    sources: dict[str, str]
+
+    def columns(self) -> Iterator[tuple[str, str, Array]]:
+        """Name, measure and values (T,) of every number: of vectors the components."""
+        for name, values in self.values.items():
+            if values.ndim == 2:
+                yield from ((f"{name}_{axis}", name, values[:, k]) for k, axis in enumerate(AXES))
+            else:
+                yield name, name, np.broadcast_to(values, self.time.shape)
+
+    def as_dict(self) -> dict[str, Any]:
+        told = {name: {"unit": UNITS[name], "source": self.sources[name], **summary(values)}
+                for name, values in self.values.items()}
+        return {"file": self.file, "status": self.status, "frames": len(self.time),
+                "first_time": number(self.time[:1]), "last_time": number(self.time[-1:]), "measures": told}
+
+
+def summary(values: Array) -> dict[str, Any]:
+    """First and last value, least, most and mean, of vectors by component; of one value a run that value."""
+    if values.ndim == 0:
+        return {"value": number(values)}
+    if not len(values):
+        return dict.fromkeys(("first", "last", "least", "most", "mean"))
+    return {"first": number(values[0]), "last": number(values[-1]), "least": number(values.min(axis=0)),
+            "most": number(values.max(axis=0)), "mean": number(values.mean(axis=0))}
+
+
+def number(value: Any) -> Any:
+    """A number, or a list of them, as JSON has them; None for what is not finite or not there."""
+    array = np.asarray(value, float)
+    if array.size == 1:
+        return float(array.reshape(())) if np.isfinite(array).all() else None
+    return [number(each) for each in array] or None
+
+
+def analyze(path: Path, names: Sequence[str] = (), body: str | None = None, recorded: bool = True) -> Analysis:
+    """The measures of a file: those named, or all the usual ones that it has.
+
+    Raises MeasureError for a measure or body that it has not, TrajectoryError for a file that cannot be read.
+    """
+    with reader.open(path) as trajectory:
+        wanted = list(names) or measurable(trajectory, USUAL, body, recorded)
+        try:
+            values = measure(trajectory, wanted, body, recorded)
+        except (MeasureError, TrajectoryError):
+            raise
+        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+            raise TrajectoryError(f"{path}: cannot be measured, its scene or its numbers are damaged ({error!r})") from error
+        return Analysis(str(path), status_of(trajectory), trajectory.time, values,
+                        {name: source(trajectory, name, body, recorded) for name in wanted})
+
+
+def status_of(trajectory: Trajectory) -> str:
+    return str(trajectory.provenance.get("status", "unknown")).rstrip("\0")
+
+
+def trajectories(places: Sequence[Path]) -> list[Path]:
+    """Files as named, and all trajectory files in folders, in alphabetical order. Raises TrajectoryError for a folder without."""
+    found = []
+    for place in places:
+        files = sorted(place.rglob("*.vtkhdf")) if place.is_dir() else [place]
+        if not files:
+            raise TrajectoryError(f"{place}: there is no trajectory file in this folder")
+        found += files
+    return found
+
+
+def table(analyses: Sequence[Analysis]) -> Iterator[str]:
+    """Files side by side: last value, least and most of every number."""
+    names = {column: measure for analysis in analyses for column, measure, _ in analysis.columns()}
+    numbers = [{column: values for column, _, values in analysis.columns()} for analysis in analyses]
+    wide = max(len(f"{name} [{UNITS[kind]}]") for name, kind in names.items()) if names else 0
+    for place, analysis in enumerate(analyses, start=1):
+        which = f"{place}: " if len(analyses) > 1 else ""
+        end = f", {analysis.time[0]:.6g} to {analysis.time[-1]:.6g} s" if len(analysis.time) else ""
+        yield f"{which}{analysis.file}: {analysis.status}, {len(analysis.time)} frames{end}"
+    head = "".join(f"{text:>{WIDTH}}" for text in ("last", "least", "most"))
+    yield " " * wide + "".join(f"{f'{place}:' if len(analyses) > 1 else '':>4}{head}" for place in range(1, len(analyses) + 1))
+    for name, kind in names.items():
+        label = f"{name} [{UNITS[kind]}]" if UNITS[kind] else name
+        yield (f"{label:<{wide}}" + "".join(" " * 4 + cell(each.get(name), kind) for each in numbers)).rstrip()
+    for where in (POSITIONS, COLLIDERS):
+        if computed := [name for name, known in analyses[0].sources.items() if known == where]:
+            yield f"from {where}: {', '.join(computed)}"
+
+
+def cell(values: Array | None, kind: str) -> str:
+    """Last, least and most of a column; one value if there is one a run; nothing where a file has no such measure."""
+    if values is None or not len(values):
+        return " " * (3 * WIDTH)
+    if kind == "rest_time":
+        told = f"{values[0]:.5g}" if np.isfinite(values[0]) else "never"
+        return f"{told:>{WIDTH}}" + " " * (2 * WIDTH)
+    return "".join(f"{value:{WIDTH}.5g}" for value in (values[-1], values.min(), values.max()))
+
+
+def write_csv(analyses: Sequence[Analysis], path: Path) -> None:
+    """One row a frame of every file: file, frame, time, numbers; empty where there is none."""
+    columns = list({column: None for analysis in analyses for column, _, _ in analysis.columns()})
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["file", "frame", "time", *columns])
+        for analysis in analyses:
+            found = {column: values for column, _, values in analysis.columns()}
+            rows = [found.get(column) for column in columns]
+            for frame, time in enumerate(analysis.time.tolist()):
+                writer.writerow([analysis.file, frame, time, *(written(values, frame) for values in rows)])
+
+
+def written(values: Array | None, frame: int) -> float | str:
+    return "" if values is None or not np.isfinite(values[frame]) else float(values[frame])
+
+
+def plot(analyses: Sequence[Analysis], path: Path) -> None:
+    """The course of every measure that is not 0 throughout in a panel of its own, one colour a file; of vectors x full, y
+    dashed, z dotted."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    courses = {name: None for analysis in analyses for name, values in analysis.values.items() if values.ndim and values.any()}
+    names = list(courses)
+    columns = min(3, max(1, len(names)))
+    rows = max(1, -(-len(names) // columns))
+    figure = Figure(figsize=(4.2 * columns, 2.5 * rows + 0.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    for place, name in enumerate(names):
+        axes = figure.add_subplot(rows, columns, place + 1)
+        for colour, analysis in enumerate(analyses):
+            if name in analysis.values:
+                draw(axes, analysis.time, analysis.values[name], f"C{colour}", analysis.file)
+        logarithmic = name in LOGARITHMIC and any((analysis.values.get(name, np.zeros(1)) > 0).any() for analysis in analyses)
+        axes.set_yscale("log" if logarithmic else "linear")
+        axes.set_title(name.replace("_", " ") + (f"  [{UNITS[name]}]" if UNITS[name] else ""), fontsize=9)
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3)
+        axes.margins(x=0)
+        if place >= len(names) - columns:
+            axes.set_xlabel("time [s]", fontsize=8)
+    if names:
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", fontsize=8, ncols=min(3, len(labels)))
+    figure.savefig(path, dpi=110)
+
+
+def draw(axes: Any, time: Array, values: Array, colour: str, label: str) -> None:
+    """One curve, or three of a vector, of one colour."""
+    for k, curve in enumerate(values.reshape(len(time), -1).T):
+        axes.plot(time, curve, ("-", "--", ":")[k], color=colour, linewidth=1.2, label=label if k == 0 else None)
