@@ -2,7 +2,7 @@
 
 An effect that the scene does not call for is None. Each phase gets that None as an argument of its own and returns at
 once; the compiler drops the branch, so the effect is no part of the machine code. The world is taken apart once, before
-the loop: within it, every look into a buffer would count the references of its arrays.
+the loop.
 """
 
 from verlet_numba._jit import kernel

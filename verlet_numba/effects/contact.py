@@ -5,9 +5,6 @@ it must not go below, from the particle's predicted place. Where the prediction 
 that the particle met first, judged from its place at the start of the substep in the collider's own frame: fast
 particles leave by the face through which they came. Before every relaxation pass the contacts are separated, with
 the push accumulated over the passes: a pass may take back what an earlier one gave too much, never pull.
-
-Loops over particles and contacts work on arrays that are taken out of their buffers before: a buffer that is passed or
-read within a loop has the references of its arrays counted each time, which costs ten times the work.
 """
 
 from verlet_numba._jit import formula, inlined, kernel

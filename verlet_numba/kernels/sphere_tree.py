@@ -8,7 +8,6 @@ taken together if their rectangles touch, at a side or at a corner: then a path 
 particles by edges that one of the parts owns, as a particle owns both its edges along j and that to the next i. The proof
 assumes nothing about the cloth's shape, so what is listed does not depend on it.
 
-Loops work on bare arrays and scalars: an array that is passed or looked up within a loop has its references counted.
 """
 
 import math
