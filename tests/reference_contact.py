@@ -6,7 +6,8 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import brentq
 
-from verlet_numba.effects.response import RECOVERY, SETTLED, SHARE, SMALL, SWEEPS
+from verlet_numba.effects.aim import RECOVERY, SHARE, SMALL
+from verlet_numba.effects.response import SETTLED, SWEEPS
 
 
 def turned(axis, angle):

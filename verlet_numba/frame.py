@@ -7,6 +7,7 @@ the loop.
 
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -18,21 +19,8 @@ from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, gat
 from verlet_numba.effects.mesh_contact import deepest_in_meshes
 from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
-from verlet_numba.effects.response import (
-    aim_colliders,
-    aim_hulls,
-    begin_pass,
-    displace,
-    keep_colliders,
-    keep_hulls,
-    kick_back,
-    link,
-    rebound,
-    recall_colliders,
-    recall_hulls,
-    respond,
-    shove,
-)
+from verlet_numba.effects.recall import begin_pass, keep_colliders, keep_hulls, recall_colliders, recall_hulls
+from verlet_numba.effects.response import displace, kick_back, link, rebound, shove
 from verlet_numba.effects.rest import at_rest, depth_at_rest, find_at_colliders, hold, idle, settle, wake
 from verlet_numba.effects.restitution import bounce, foresee
 from verlet_numba.effects.soft import find_mixed, find_soft

@@ -13,8 +13,9 @@ import math
 import numpy as np
 
 from verlet_numba._jit import inlined, kernel
+from verlet_numba.effects.aim import aim_hulls, respond
 from verlet_numba.effects.meet import gather
-from verlet_numba.effects.response import aim_hulls, displace, relative, respond, strike
+from verlet_numba.effects.response import displace, relative, strike
 from verlet_numba.effects.touch import COLLIDERS, HULLS, MIXED
 
 ROUNDS = 64         # through the touches or pairs, at most

@@ -7,7 +7,6 @@ their edges prove that no two of their particles that may meet are within reach 
 taken together if their rectangles touch, at a side or at a corner: then a path without a turn back joins any two of their
 particles by edges that one of the parts owns, as a particle owns both its edges along j and that to the next i. The proof
 assumes nothing about the cloth's shape, so what is listed does not depend on it.
-
 """
 
 import math

@@ -12,7 +12,7 @@ from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.shapes import edges
 
 TOUCH = 1e-6            # of the smaller body's size: overlap up to this is touching
-RECOVERY = 2.5          # 1/s: how fast whole bodies give an overlap back, in radii of the smaller one (effects/response.py)
+RECOVERY = 2.5          # 1/s: how fast whole bodies give an overlap back, in radii of the smaller one (effects/aim.py)
 MOST_BODIES = 2000      # more bodies than this, and
 MOST_AXES = 50_000      # pairs with more candidate axes than this, are not compared
 CHUNK = 2_000_000       # pairs of points looked at together

@@ -5,25 +5,10 @@ import pytest
 import worlds
 from scipy.spatial.transform import Rotation
 
+from verlet_numba.effects.aim import RECOVERY, SHARE, aim_colliders, aim_hulls, left_for_later, respond, still_given
 from verlet_numba.effects.meet import find_meetings, gather
-from verlet_numba.effects.response import (
-    RECOVERY,
-    SHARE,
-    aim_colliders,
-    aim_hulls,
-    begin_pass,
-    displace,
-    keep_hulls,
-    kick_back,
-    left_for_later,
-    link,
-    rebound,
-    recall_colliders,
-    recall_hulls,
-    respond,
-    shove,
-    still_given,
-)
+from verlet_numba.effects.recall import begin_pass, keep_hulls, recall_colliders, recall_hulls
+from verlet_numba.effects.response import displace, kick_back, link, rebound, shove
 from verlet_numba.effects.touch import HULLS, begin_touches, touch_colliders, touch_hulls, weigh
 
 H = 1 / 240
