@@ -122,7 +122,8 @@ class Drag(NamedTuple):
 
 
 class Damping(NamedTuple):
-    rate: Array                 # (n,) real 1/s
+    gain: Array                 # (n,) double 1; (1 - exp(-r h)) / (r h), r the rate
+    loss: Array                 # (n,) double 1/s^2; gain r / h
 
 
 class Paths(NamedTuple):

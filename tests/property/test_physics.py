@@ -151,7 +151,7 @@ def test_effects_set_to_nothing_change_nothing(without):
     moving = {"kind": "sphere", "radius": 1, "position": [99, 0, 0], "spin": {"axis": [0, 0, 1], "rate": 1},
               "friction": 1, "restitution": 0}
     mesh = worlds.EVERYTHING["colliders"][-1] | {"friction": 0, "restitution": 0}
-    nothing = {"drag": {"linear": 0, "quadratic": 0}, "damping": 0, "wind": {"velocity": [9, 9, 9], "density": 0},
+    nothing = {"drag": {"linear": 1e-30, "quadratic": 0}, "damping": 1e-30, "wind": {"velocity": [9, 9, 9], "density": 1e-30},
                "rest": worlds.EVERYTHING["effects"]["rest"]}
     crowded = worlds.with_changes(scene, effects=nothing, bodies=[*scene["bodies"], far],
                                   colliders=[*scene["colliders"], moving, mesh], output={"fields": ["velocity"]})
@@ -167,6 +167,13 @@ def test_effects_set_to_nothing_change_nothing(without):
 def test_materials_of_nothing_are_absent(without):
     effects = worlds.built(without[0]).world.effects
     assert (effects.friction, effects.restitution) == (None, None)
+
+
+def test_resistance_of_nothing_is_absent():
+    """Its loops would cost as much as if it were something."""
+    nothing = {"drag": {"linear": 0, "quadratic": 0}, "damping": 0, "wind": {"velocity": [9, 9, 9], "density": 0}}
+    effects = worlds.built(worlds.with_changes(FLIGHT, effects=nothing)).world.effects
+    assert (effects.drag, effects.damping, effects.wind) == (None, None, None)
 
 
 def test_gravity_of_nothing_is_no_gravity():

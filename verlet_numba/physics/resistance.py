@@ -29,11 +29,10 @@ def drag(ax, ay, az, dx, dy, dz, wx, wy, wz, linear, quadratic, h):
 
 
 @formula
-def damped(acceleration, displacement, rate, h):
-    """Acceleration that makes the step exact for v' = a - rate v with constant a: v decays as exp(-rate t).
+def damped(acceleration, displacement, gain, loss):
+    """Acceleration that makes the step exact for v' = a - r v with constant a: v decays as exp(-r t).
 
-    Exact displacements obey d(+) = exp(-rate h) d(-) + a h^2 g, g = (1 - exp(-rate h)) / (rate h).
+    Exact displacements obey d(+) = exp(-r h) d(-) + a h^2 gain with gain = (1 - exp(-r h)) / (r h), so what Verlet's step needs
+    is a gain - d loss with loss = (1 - exp(-r h)) / h^2 = gain r / h [1/s^2].
     """
-    lost = -math.expm1(-rate * h)
-    gain = lost / (rate * h) if rate > 0.0 else 1.0
-    return acceleration * gain - displacement * lost / (h * h)
+    return acceleration * gain - displacement * loss

@@ -60,7 +60,7 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     inverse_mass = spread(numbering, [move / mass for move, mass in zip(moves, masses, strict=True)], size)
 
     together = attachments(scene, bodies, numbering)
-    effects = effects_of(scene, folder, bodies, numbering, together, inverse_mass, real)
+    effects = effects_of(scene, folder, bodies, numbering, together, inverse_mass, step, real)
     ordered = scene.solver.order == "constraint_graph"
     joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real, rigid=not ordered)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
@@ -83,13 +83,13 @@ def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
 
 
 def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
-               real: Any) -> Effects:
+               step: float, real: Any) -> Effects:
     """What the scene calls for, None for everything else."""
     contact = contact_of(scene, folder, bodies, numbering, together, inverse_mass, real)
     return Effects(forces.gravity(scene.effects, inverse_mass, real),
                    forces.wind(scene.effects, bodies, numbering, inverse_mass, real),
                    forces.drag(scene.effects, inverse_mass, real),
-                   forces.damping(scene.effects, inverse_mass, real),
+                   forces.damping(scene.effects, inverse_mass, step),
                    carried(bodies, numbering), *contact)
 
 

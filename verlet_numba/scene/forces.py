@@ -23,7 +23,7 @@ def gravity(effects: Effects, inverse_mass: Floats, real: Any) -> Gravity | None
 
 
 def drag(effects: Effects, inverse_mass: Floats, real: Any) -> Drag | None:
-    if effects.drag is None:
+    if effects.drag is None or effects.drag.linear == effects.drag.quadratic == 0.0:
         return None
     moves = inverse_mass > 0
     air = None if effects.wind is None else lanes_of(effects.wind.velocity, moves, real)
@@ -31,16 +31,22 @@ def drag(effects: Effects, inverse_mass: Floats, real: Any) -> Drag | None:
     return Drag(gate(linear, real), gate(quadratic, real), air)
 
 
-def damping(effects: Effects, inverse_mass: Floats, real: Any) -> Damping | None:
-    if effects.damping is None:
+def damping(effects: Effects, inverse_mass: Floats, step: float) -> Damping | None:
+    if not effects.damping:
         return None
-    return Damping(gate(np.where(inverse_mass > 0, effects.damping, 0.0), real))
+    return Damping(*(gate(factor, np.float64) for factor in decay(np.where(inverse_mass > 0, effects.damping, 0.0), step)))
+
+
+def decay(rate: Floats, step: float) -> tuple[Floats, Floats]:
+    """Gain [1] and loss [1/s^2] of damping at a rate [1/s] in steps [s], as physics/resistance.py has them."""
+    lost = -np.expm1(-rate * step)
+    return np.divide(lost, rate * step, out=np.ones(rate.shape), where=rate > 0), lost / step**2
 
 
 def wind(effects: Effects, bodies: list[Body], numbering: Numbering, inverse_mass: Floats, real: Any) -> Wind | None:
     """Wind on the triangles of every body; None if the scene has none."""
     groups = [group for group in numbering.groups if len(group.shape.triangles)]
-    if effects.wind is None or not groups:
+    if effects.wind is None or effects.wind.density == 0.0 or not groups:
         return None
     firsts, counts, shares = [], [], []
     for group in groups:

@@ -73,13 +73,14 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     scene, world = prepared.scene, model.world
     effects, active = scene.effects, world.effects
     faces = any(len(body.shape.triangles) for body in prepared.bodies)
-    named, unnamed = "named in effects", "not named in effects"
+    named, unnamed, nothing = "named in effects", "not named in effects", "named, but it is set to nothing"
     moves = can_move(world)
     yield Phase("gravity", active.gravity is not None, named if effects.gravity else unnamed)
     yield Phase("wind", active.wind is not None,
-                unnamed if effects.wind is None else named if faces else "named, but no body has triangles")
-    yield Phase("drag", active.drag is not None, named if effects.drag else unnamed)
-    yield Phase("damping", active.damping is not None, named if effects.damping is not None else unnamed)
+                unnamed if effects.wind is None else "named, but no body has triangles" if not faces else
+                named if active.wind else nothing)
+    yield Phase("drag", active.drag is not None, unnamed if effects.drag is None else named if active.drag else nothing)
+    yield Phase("damping", active.damping is not None, unnamed if effects.damping is None else named if active.damping else nothing)
     yield Phase("integrate", moves, "particles move" if moves else "nothing can move")
     yield Phase("paths of pinned particles", active.carried is not None,
                 "a body has a path" if active.carried else "no body has a path")

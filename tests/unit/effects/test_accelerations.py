@@ -9,6 +9,7 @@ from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.wind import blow
+from verlet_numba.scene.forces import decay
 
 H, N = 0.01, 23
 EXACT = {np.float64: 1e-10, np.float32: 1e-4}
@@ -60,7 +61,7 @@ def test_drag(particles, air):
 def test_damping(particles):
     a, _, d = rows(particles)
     rate = np.where(np.arange(N) % 5, np.linspace(0, 40, N), 0).astype(particles.position.dtype)
-    damp(*state(particles), H, Damping(rate))
+    damp(*state(particles), H, Damping(*decay(rate.astype(float), H)))
     agree(particles, np.array([with_damping(a[p], d[p], float(rate[p]), H) for p in range(N)]))
 
 
@@ -84,7 +85,7 @@ def test_wind_in_runs_of_triangles(particles):
 def test_effects_of_nothing_change_no_bit(particles):
     real, before = particles.position.dtype, particles.acceleration.copy()
     nothing = np.zeros(N, real)
-    damp(*state(particles), H, Damping(nothing))
+    damp(*state(particles), H, Damping(np.ones(N), np.zeros(N)))
     resist(*state(particles), H, Drag(nothing, nothing, np.ones((3, N), real)))
     resist(*state(particles), H, Drag(nothing, nothing, None))
     first, lanes, data = np.array([[0], [5], [10]]), np.array([5]), np.array([0])

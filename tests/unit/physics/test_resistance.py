@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from verlet_numba.physics.resistance import damped, drag
+from verlet_numba.scene.forces import decay
 
 START = np.array([3.0, -1.0, 2.0])
 AIR = np.array([1.0, 2.0, -0.5])
@@ -60,9 +61,9 @@ def test_damping_is_exact_at_any_step(rate):
 
     for t in (0.0, 0.4):
         displacement = x(t) - x(t - h)
-        following = displacement + damped(a, displacement, rate, h) * h * h
+        following = displacement + damped(a, displacement, *decay(np.array(rate), h)) * h * h
         assert following == pytest.approx(x(t + h) - x(t), rel=1e-8 if rate < 1e-6 else 1e-11, abs=1e-14 * abs(displacement))
 
 
 def test_no_damping_changes_nothing():
-    assert damped(1.25, 3.0, 0.0, 0.01) == 1.25
+    assert damped(1.25, 3.0, *decay(np.array(0.0), 0.01)) == 1.25
