@@ -6,7 +6,7 @@ the loop: within it, every look into a buffer would count the references of its 
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -44,6 +44,7 @@ from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
 from verlet_numba.kernels.relax_graph import relax_graph
+from verlet_numba.kernels.relax_lines import relax_lines
 
 OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 
@@ -55,8 +56,8 @@ def advance(world, frames, budget):
     Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
-    particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided = world[:8]
-    effects, solver, observed, snapshot, clock = world[8:]
+    particles, runs, runs_softness, sticks, sticks_softness, angles, lines, lines_softness, graph, collided = world[:10]
+    effects, solver, observed, snapshot, clock = world[10:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
@@ -115,6 +116,7 @@ def advance(world, frames, budget):
             strike_spheres(position, previous, inverse_mass, acceleration, spheres, restitution, h)
             forget(runs_softness)
             forget(sticks_softness)
+            forget(lines_softness)
             note_places(position, collided)
             for again in range(passes):
                 separate(position, contact)                                 # before every pass (P18)
@@ -133,10 +135,12 @@ def advance(world, frames, budget):
                 displace(position, inverse_mass, rigid)
                 if not again:
                     choose_lists(position, collided, graph)                 # of the particles moved most (P9)
-                snapshot.counts[0] += relax_graph(position, graph, tolerance, approximate)
-                snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
-                snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
-                snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
+                snapshot.counts[RELAXED] += relax_graph(position, graph, tolerance, approximate)
+                snapshot.counts[RELAXED] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
+                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate,
+                                                        snapshot.counts)
+                snapshot.counts[RELAXED] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
+                snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)
             keep_hulls(meet, rigid, touches, HULLS)

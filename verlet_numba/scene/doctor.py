@@ -23,13 +23,14 @@ Warnings = Iterator[tuple[Key, str]]
 TOUCH = 1e-6            # of a body's size: overlap up to this is touching
 STRETCH = 0.01          # relative length error at the start that is worth a word
 MASS_RATIO = 100.0      # of particles joined to each other, above which few passes leave visible stretch
+FEW_LINES = 360.0       # substeps a second below which cloth that is solved in lines comes apart (6 at 60 frames a second)
 RESOLVED = 1e-3         # of the shortest stick: numbers further apart than this spoil its length
 
 
 def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> list[Problem]:
     """Warnings about a scene and its placed bodies (`place`), each with its position in the file."""
     surfaces, _ = load_surfaces(scene, folder, source)
-    found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies)]
+    found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies), *coarse_lines(scene, bodies)]
     if scene.effects.contact != "none":
         found += [*inside_colliders(scene, bodies, surfaces), *overlaps(scene, bodies), *selves(scene, bodies),
                   *cramped(scene, bodies), *slipping(scene, bodies), *rebounds(scene, bodies)]
@@ -105,6 +106,14 @@ def attachments(scene: Scene, bodies: list[Body]) -> Warnings:
         elif not any(held) and max(masses) > MASS_RATIO * min(masses):
             yield path, (f"joins masses of {max(masses) / min(masses):.3g}:1, which few passes leave apart: use more "
                          "substeps")
+
+
+def coarse_lines(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Lines of cloth in steps so long that they are no longer nearly straight from one to the next."""
+    woven = any(body.shape.kind == "cloth" for body in bodies)
+    if scene.solver.order == "lines" and woven and substeps_a_second(scene) < FEW_LINES:
+        yield ("solver", "order"), (f"`lines` of cloth take at least {FEW_LINES:g} substeps a second, here they have "
+                                    f"{substeps_a_second(scene):g}: use more substeps, or `sequential`")
 
 
 def cramped(scene: Scene, bodies: list[Body]) -> Warnings:
