@@ -68,6 +68,7 @@ class Lines(NamedTuple):
     data: Array                 # (R,) int 1; where the family's constraints stand in the arrays below
     rows: Array                 # (R,) int 1; the family is solved turned, a matrix of so many rows; 0: it is solved as it stands
     active: Array               # (R,) int 1; constraints that are not masked out
+    settled: Array              # (R,) double 1; relative error of a stick that is left to the next pass
     rest: Array                 # (C,) real m
     diagonal: Array             # (C,) real 1/kg; w_i + w_j + compliance / h^2, a trace more; 0 masks a lane out
     coupling: Array             # (C,) real 1/kg; w_i where the chain goes on, 0 at its first stick
@@ -77,7 +78,7 @@ class Lines(NamedTuple):
     pull: Array                 # (V,) real SI; the right side, then the multipliers
     moved: Array                # (3, W) real m; how far the particles are moved
     turned: Array               # (3, T) real SI; pivot, bond and pull turned
-    apart: Array                # (V,) int 1; 1: the constraint's chain is treated apart
+    marks: Array                # (V,) int 1; of each constraint's chain: 0 settled, 1 to be solved, 2 to be relaxed stick by stick
 
 
 class Angles(NamedTuple):

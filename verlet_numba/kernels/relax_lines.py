@@ -10,8 +10,11 @@ takes one square root and one division a stick. Chains of a family lie side by s
 k + shift and goes on from constraint k - shift, so that every stretch of `shift` constraints is a vector loop. Where that is
 short (rows of a single cloth) the system is turned: its columns become rows.
 
-The solve is one step of Newton's method. Where it changes a stick by more than TURN of its length, lines say nothing about
-what happens: that chain is relaxed stick by stick instead, and counted.
+The solve is one step of Newton's method. A stick that changes by d is left about d.d / (2 rest^2) too long: chains in which that
+is more than the family's `settled` are solved again. So a heavy weight may swing on a light rope, which it draws so tight that
+the step does not resolve its waves. Rows of cloth, which the next family spoils again, gain nothing. Where a stick would change
+by more than TURN of its length, the linear system says nothing about what happens: that chain is relaxed stick by stick instead,
+and counted.
 """
 
 import math
@@ -24,6 +27,8 @@ from verlet_numba.kernels.relax import share_of
 from verlet_numba.physics.distance import excess, stretch_approximate
 
 TURN = 2.0          # times its length: no turn changes a stick by more
+MOST = 16           # solves of a chain
+OPEN, WILD = 1, 2   # chains that are to be solved again, and that are relaxed stick by stick
 TILE = 8            # numbers of a line of the cache, in double precision
 
 
@@ -33,33 +38,40 @@ def relax_lines(position, inverse_mass, lines, softness, tolerance, approximate,
     if lines is None:
         return 0
     vector, pivot, bond, pull = lines.vector, lines.pivot, lines.bond, lines.pull
-    moved, turned, apart = lines.moved, lines.turned, lines.apart
+    moved, turned, marks = lines.moved, lines.turned, lines.marks
     relaxed = 0
     for r in range(lines.lanes.size):
         i, s, n, d, rows = lines.first[r], lines.shift[r], lines.lanes[r], lines.data[r], lines.rows[r]
         rest, diagonal, coupling = lines.rest[d:d + n], lines.diagonal[d:d + n], lines.coupling[d:d + n]
-        measure(position, i, s, n, rest, diagonal, vector, pivot, pull, approximate)
-        ease(softness, d, n, vector, pull)
-        relaxed += leave(tolerance, s, n, rest, diagonal, coupling, vector, pull, apart, lines.active[r])
-        couple(vector, s, n, coupling, bond)
-        if rows == 0:
-            solve(pivot, bond, pull, s, n)
-        else:
-            turn(pivot, turned[0], rows, n // rows)
-            turn(bond, turned[1], rows, n // rows)
-            turn(pull, turned[2], rows, n // rows)
-            solve(turned[0], turned[1], turned[2], s * rows, n)
-            turn(turned[2], pull, n // rows, rows)
-        weigh(inverse_mass, i, s, n, vector, pull, moved)
-        wild = count_wild(s, n, rest, diagonal, moved, apart)
-        if wild > 0:
-            spread(apart, coupling, s, n)
-            counts[FALLEN] += let_go(diagonal, coupling, apart, pull, n)
+        for again in range(MOST):
+            measure(position, i, s, n, rest, diagonal, vector, pivot, pull, approximate)
+            ease(softness, d, n, vector, pull)
+            if again:
+                leave_settled(marks, pull, n)
+            else:
+                relaxed += leave_tolerable(tolerance, s, n, rest, diagonal, coupling, vector, pull, marks, lines.active[r])
+            couple(vector, s, n, coupling, bond)
+            if rows == 0:
+                solve(pivot, bond, pull, s, n)
+            else:
+                turn(pivot, turned[0], rows, n // rows)
+                turn(bond, turned[1], rows, n // rows)
+                turn(pull, turned[2], rows, n // rows)
+                solve(turned[0], turned[1], turned[2], s * rows, n)
+                turn(turned[2], pull, n // rows, rows)
             weigh(inverse_mass, i, s, n, vector, pull, moved)
-        shift(position, moved, i, s, n)
-        tense(softness, d, n, diagonal, vector, pull)
-        if wild > 0:
-            relax_singly(position, inverse_mass, i, s, n, rest, diagonal, apart, softness, d, approximate)
+            unsettled, wild = judge(s, n, rest, diagonal, moved, marks, lines.settled[r])
+            if unsettled:
+                spread(marks, coupling, s, n)
+            if wild:
+                counts[FALLEN] += let_go(diagonal, coupling, marks, pull, n)
+                weigh(inverse_mass, i, s, n, vector, pull, moved)
+            shift(position, moved, i, s, n)
+            tense(softness, d, n, diagonal, vector, pull)
+            if wild:
+                relax_singly(position, inverse_mass, i, s, n, rest, diagonal, marks, softness, d, approximate)
+            if unsettled == wild:
+                break
     return relaxed
 
 
@@ -103,20 +115,27 @@ def length(vector, k):
 
 
 @kernel
-def leave(tolerance, s, n, rest, diagonal, coupling, vector, pull, apart, active):
+def leave_tolerable(tolerance, s, n, rest, diagonal, coupling, vector, pull, marks, active):
     """Chains within the relative tolerance from end to end have nothing to solve. Returns the constraints of the others."""
     if tolerance is None:
         return active
     for k in range(n):
-        apart[k] = diagonal[k] > 0 and abs(pull[k]) > tolerance * rest[k] * length(vector, k)
-    spread(apart, coupling, s, n)
+        off = diagonal[k] > 0 and abs(pull[k]) > tolerance * rest[k] * length(vector, k)
+        marks[k] = OPEN if off else 0
+    spread(marks, coupling, s, n)
+    leave_settled(marks, pull, n)
     relaxed = 0
     for k in range(n):
-        if apart[k] == 0:
-            pull[k] = 0.0
-        elif diagonal[k] > 0:
-            relaxed += 1
+        relaxed += marks[k] == OPEN and diagonal[k] > 0
     return relaxed
+
+
+@kernel
+def leave_settled(marks, pull, n):
+    """Only chains that are open have something to solve."""
+    for k in range(n):
+        if marks[k] != OPEN:
+            pull[k] = 0.0
 
 
 @kernel
@@ -178,35 +197,39 @@ def weigh(inverse_mass, i, s, n, vector, pull, moved):
 
 
 @kernel
-def count_wild(s, n, rest, diagonal, moved, apart):
-    """Mark and count the sticks that would change by more than TURN of their length, or to what is no number."""
+def judge(s, n, rest, diagonal, moved, marks, settled):
+    """Mark the sticks that change too much for one solve, or for any. Returns how many they are, and how many of them are wild."""
     ax, ay, az, bx, by, bz = moved[0], moved[1], moved[2], moved[0, s:], moved[1, s:], moved[2, s:]
-    most, zero, wild = rest.dtype.type(TURN * TURN), rest.dtype.type(0), 0
+    real = rest.dtype.type
+    zero, little, most, unsettled, wild = real(0), real(2 * settled), real(TURN * TURN), 0, 0
     for k in range(n):
         dx, dy, dz = bx[k] - ax[k], by[k] - ay[k], bz[k] - az[k]
-        tame = (dx * dx + dy * dy + dz * dz <= most * rest[k] * rest[k]) | (diagonal[k] == zero)
-        apart[k] = not tame
-        wild += not tame
-    return wild
+        change, unit, there = dx * dx + dy * dy + dz * dz, rest[k] * rest[k], diagonal[k] > zero
+        far = there & (not change <= little * unit)
+        farther = there & (not change <= most * unit)
+        marks[k] = WILD if farther else OPEN if far else 0
+        unsettled += far
+        wild += farther
+    return unsettled, wild
 
 
 @kernel
-def spread(apart, coupling, s, n):
-    """What is marked on one constraint is marked on all of its chain."""
+def spread(marks, coupling, s, n):
+    """The highest mark of a chain's constraints is that of all."""
     for k in range(s, n):
-        if coupling[k] > 0 and apart[k - s]:
-            apart[k] = 1
+        if coupling[k] > 0:
+            marks[k] = max(marks[k], marks[k - s])
     for k in range(n - 1, s - 1, -1):
-        if coupling[k] > 0 and apart[k]:
-            apart[k - s] = 1
+        if coupling[k] > 0:
+            marks[k - s] = max(marks[k], marks[k - s])
 
 
 @kernel
-def let_go(diagonal, coupling, apart, pull, n):
-    """Chains that are marked get no multipliers. Returns how many they are."""
+def let_go(diagonal, coupling, marks, pull, n):
+    """Wild chains get no multipliers. Returns how many they are."""
     chains = 0
     for k in range(n):
-        if apart[k]:
+        if marks[k] == WILD:
             pull[k] = 0.0
             chains += diagonal[k] > 0 and coupling[k] == 0
     return chains
@@ -232,12 +255,12 @@ def tense(softness, d, n, diagonal, vector, pull):
 
 
 @kernel
-def relax_singly(position, inverse_mass, i, s, n, rest, diagonal, apart, softness, d, approximate):
-    """The marked constraints one after another, from the first of each chain to its last."""
+def relax_singly(position, inverse_mass, i, s, n, rest, diagonal, marks, softness, d, approximate):
+    """The constraints of wild chains one after another, from the first of each chain to its last."""
     x, y, z = position[0], position[1], position[2]
     real, tiny = position.dtype.type, np.finfo(position.dtype).tiny
     for k in range(n):
-        if apart[k] and diagonal[k] > 0:
+        if marks[k] == WILD and diagonal[k] > 0:
             p, q = i + k, i + k + s
             dx, dy, dz = x[q] - x[p], y[q] - y[p], z[q] - z[p]
             _, f = share_of(dx * dx + dy * dy + dz * dz + tiny, rest[k], real(0), softness, d + k, approximate)

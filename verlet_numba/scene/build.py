@@ -67,7 +67,7 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     passes = scene.solver.iterations
     singly = loose(bodies, numbering) if chained else (bodies, numbering)
     joined = constraints(*singly, together, inverse_mass, step, passes, real, rigid=not ordered)
-    lines = lines_of(bodies, numbering, inverse_mass, step, passes, real) if chained else (None, None)
+    lines = lines_of(bodies, numbering, inverse_mass, step, real) if chained else (None, None)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
     collided = collided_of(graph, size, real)
     solver = Solver(step, scene.solver.substeps, passes,

@@ -57,13 +57,14 @@ def twin(model, start):
         for _ in range(body.copies):
             sticks = [Stick(*(first + ends), rest, body.shape.compliance)
                       for ends, rest in zip(body.shape.sticks, body.shape.lengths, strict=True)]
-            found += [[sticks[c] for c in chain] for chain in chains(body.shape)[0]]
+            found += [([sticks[c] for c in chain], body.shape.layout[0] != "grid") for chain in chains(body.shape)[0]]
             first += len(body.pinned)
     solver = model.scene.solver
     counts = np.zeros(2, int)
     for _ in range(PASSES):
-        for chain in found:
-            counts += relax_pieces(x, w, chain, model.world.solver.step, solver.tolerance, solver.square_root == "approximate")
+        for chain, again in found:
+            counts += relax_pieces(x, w, chain, model.world.solver.step, solver.tolerance, solver.square_root == "approximate",
+                                   again)
     return x, *counts
 
 
