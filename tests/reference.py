@@ -64,6 +64,31 @@ def relax_stick(x, w, stick, h, tolerance=0.0, approximate=False):
     return True
 
 
+def relax_started_stick(x, previous, w, stick, h, tolerance=0.0, approximate=False, present=False, soft=False):
+    """SHAKE along r, the stick at the start of the substep: p - r (w_i + w_j) l has the length rest to first order in l.
+
+    In lengths, with C = (p.p - rest^2) / (2 p.r) |r|, it is XPBD along r; a present direction is relax_stick's.
+    """
+    i, j = stick.i, stick.j
+    p, r = x[j] - x[i], previous[j] - previous[i]
+    if present or stick.rest == 0:
+        return relax_stick(x, w, stick, h, tolerance, approximate)
+    if w[i] + w[j] == 0:
+        return False
+    length, alpha = np.linalg.norm(r), stick.compliance / h**2
+    C = (p @ p - stick.rest**2) / (2 * p @ r) * length if p @ r > 0 else 0.0
+    off = abs(C + alpha * stick.multiplier) if soft else abs(np.linalg.norm(p) - stick.rest)
+    if tolerance > 0 and off <= tolerance * stick.rest:
+        return False
+    if p @ r <= 0:
+        return True
+    change = -(C + alpha * stick.multiplier) / (w[i] + w[j] + alpha)
+    stick.multiplier += change
+    x[i] -= w[i] * change * r / length
+    x[j] += w[j] * change * r / length
+    return True
+
+
 def chains(shape):
     """Numbers of the sticks of every chain of a shape, in the order of relaxation, and of those that are in none."""
     ends = {frozenset(stick.tolist()): c for c, stick in enumerate(shape.sticks)}

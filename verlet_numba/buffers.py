@@ -126,6 +126,18 @@ class Collided(NamedTuple):
     moved: Array                # (G,) int 1; particle of the body that the separation moved farthest, -1: none
 
 
+class Start(NamedTuple):
+    """Sticks corrected along their direction at the start of the substep, but for bodies that were hit or change much in it."""
+
+    before: Array | None        # (3, n) real m; positions before contacts; None: nothing touches
+    marks: Array                # (n,) real 1; 1: a particle of a body whose sticks take their present direction
+    marked: Array               # (1,) int 1; 0: there is none
+    first: Array                # (D,) int 1; first particle of bodies side by side
+    slots: Array                # (D,) int 1; particles of each
+    lanes: Array                # (D,) int 1; bodies
+    worst: Array                # (X,) real 1; scratch: the mark of each of them
+
+
 class Gravity(NamedTuple):
     acceleration: Array         # (3, n) real m/s^2; 0 for what is pinned
 
@@ -598,6 +610,7 @@ class World(NamedTuple):
     runs_softness: Softness | None
     sticks: Sticks | None
     sticks_softness: Softness | None
+    start: Start | None         # None: sticks are corrected along their present direction
     angles: Angles | None
     lines: Lines | None
     lines_softness: Softness | None

@@ -18,6 +18,7 @@ from verlet_numba.buffers import (
     Particles,
     Snapshot,
     Solver,
+    Start,
     World,
     gate,
 )
@@ -70,13 +71,15 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     lines = lines_of(bodies, numbering, inverse_mass, step, real) if chained else (None, None)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
     collided = collided_of(graph, size, real)
+    started = start_of(numbering, effects, size, real) if scene.solver.gradient == "step_start" else None
     solver = Solver(step, scene.solver.substeps, passes,
                     scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
     particles, snapshot = state(size, inverse_mass, effects, real)
     observed = observed_of(scene, bodies, numbering)
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
-    world = World(particles, *joined, *lines, graph, collided, effects, solver, observed, snapshot, clock)
+    world = World(particles, *joined[:-1], started, joined.angles, *lines, graph, collided, effects, solver, observed, snapshot,
+                  clock)
     return Model(scene, bodies, numbering, world)
 
 
@@ -85,6 +88,16 @@ def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
     if graph is None:
         return None
     return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.bucket), -1), np.int64))
+
+
+def start_of(numbering: Numbering, effects: Effects, size: int, real: Any) -> Start:
+    """What the directions at the start of a substep need."""
+    touches = any(effect is not None for effect in (effects.contact, effects.meet, effects.spheres, effects.mixed))
+    blocks = [(group.first + block * group.slots * group.block, group.slots, group.block)
+              for group in numbering.groups for block in range(group.blocks)]
+    first, slots, lanes = (gate(column, np.int64) for column in np.array(blocks, np.int64).reshape(-1, 3).T)
+    return Start(gate(np.zeros((3, size)), real) if touches else None, gate(np.zeros(size), real), gate(np.zeros(1), np.int64),
+                 first, slots, lanes, gate(np.zeros(lanes.max(initial=1)), real))
 
 
 def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,

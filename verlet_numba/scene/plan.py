@@ -174,6 +174,8 @@ def constraints(world: World) -> Iterator[Phase]:
     soft = any(softness is not None for softness in (world.runs_softness, world.sticks_softness, world.lines_softness))
     yield Phase("compliance over passes", soft, "a body is compliant and there are several passes" if soft
                 else "no body is compliant, or one pass a substep, where it is part of the weights")
+    yield Phase("directions at the start of the step", world.start is not None,
+                f"solver.gradient is {'step_start' if world.start else 'current'}")
     yield Phase("tolerance", solver.tolerance is not None,
                 "solver.tolerance is above 0" if solver.tolerance else "solver.tolerance is 0: every stick is relaxed")
     yield Phase("angles", world.angles is not None, "a body keeps angles" if world.angles else "no body keeps angles")
