@@ -25,10 +25,10 @@ from verlet_numba.scene.shapes import stick_lengths
 
 STUDY, RESULTS = "hung_cloth", Path(__file__).parent / "results"
 SECONDS, JITTER = 2.0, 1e-6
-REPETITIONS = {True: 3, False: 7}
+REPETITIONS = {True: 3, False: 5}
 CASES = [(20, "lines", 8), (40, "lines", 6), (40, "lines", 8), (40, "lines", 12), (40, "lines", 20), (40, "lines", 24),
-         (40, "sequential", 24), (40, "sequential", 100), (100, "lines", 8), (100, "lines", 16), (100, "lines", 20)]
-BARS = {(40, 8): {"structural": 6.5e-4, "s": 0.1}, (40, 24): {"all": 6.2e-4, "s": 0.2}, (100, 20): {"structural": 1e-3, "s": 1.2}}
+         (40, "sequential", 24), (40, "sequential", 100), (100, "lines", 8), (100, "lines", 16), (100, "lines", 18)]
+BARS = {(40, 8): {"structural": 6.5e-4, "s": 0.1}, (40, 24): {"all": 6.2e-4, "s": 0.2}, (100, 18): {"structural": 1e-3, "s": 1.2}}
 """Mean strains and the seconds in which they are due: what the implicit solver of mujoco reaches in 1.4 s, and 8.9 s at 100x100."""
 STRETCH = 1e-3
 

@@ -60,9 +60,9 @@ def relax_lines(position, inverse_mass, lines, softness, tolerance, approximate,
                 solve(turned[0], turned[1], turned[2], s * rows, n)
                 turn(turned[2], pull, n // rows, rows)
             weigh(inverse_mass, i, s, n, vector, pull, moved)
-            unsettled, wild = judge(s, n, rest, diagonal, moved, marks, lines.settled[r])
+            unsettled, wild = judge(s, n, rest, diagonal, moved, lines.settled[r])
             if unsettled:
-                spread(marks, coupling, s, n)
+                mark(s, n, rest, diagonal, coupling, moved, marks, lines.settled[r])
             if wild:
                 counts[FALLEN] += let_go(diagonal, coupling, marks, pull, n)
                 weigh(inverse_mass, i, s, n, vector, pull, moved)
@@ -197,20 +197,28 @@ def weigh(inverse_mass, i, s, n, vector, pull, moved):
 
 
 @kernel
-def judge(s, n, rest, diagonal, moved, marks, settled):
-    """Mark the sticks that change too much for one solve, or for any. Returns how many they are, and how many of them are wild."""
+def judge(s, n, rest, diagonal, moved, settled):
+    """How many sticks change too much for one solve, and how many too much for any."""
     ax, ay, az, bx, by, bz = moved[0], moved[1], moved[2], moved[0, s:], moved[1, s:], moved[2, s:]
     real = rest.dtype.type
     zero, little, most, unsettled, wild = real(0), real(2 * settled), real(TURN * TURN), 0, 0
     for k in range(n):
         dx, dy, dz = bx[k] - ax[k], by[k] - ay[k], bz[k] - az[k]
         change, unit, there = dx * dx + dy * dy + dz * dz, rest[k] * rest[k], diagonal[k] > zero
-        far = there & (not change <= little * unit)
-        farther = there & (not change <= most * unit)
-        marks[k] = WILD if farther else OPEN if far else 0
-        unsettled += far
-        wild += farther
+        unsettled += there & (not change <= little * unit)
+        wild += there & (not change <= most * unit)
     return unsettled, wild
+
+
+@kernel
+def mark(s, n, rest, diagonal, coupling, moved, marks, settled):
+    """Mark the chains of these sticks."""
+    little, most = 2 * settled, TURN * TURN
+    for k in range(n):
+        dx, dy, dz = moved[0, k + s] - moved[0, k], moved[1, k + s] - moved[1, k], moved[2, k + s] - moved[2, k]
+        change, unit = dx * dx + dy * dy + dz * dz, rest[k] * rest[k]
+        marks[k] = 0 if diagonal[k] == 0 or change <= little * unit else OPEN if change <= most * unit else WILD
+    spread(marks, coupling, s, n)
 
 
 @kernel
