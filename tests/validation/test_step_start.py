@@ -145,6 +145,14 @@ def test_orders_of_convergence(simulate):
     np.testing.assert_allclose(slopes(spun), 2, atol=0.15)
 
 
+def test_a_block_that_touches_slides_as_ever(simulate):
+    """It is hit in every substep, so takes the present direction, and friction is Coulomb's: g (sin 30 - 0.3 cos 30) t^2 / 2."""
+    run = simulate(Path("validation/incline_slides.yaml"), START)
+    moved = np.linalg.norm(run.position[60].mean(0) - run.position[0].mean(0))
+    assert moved == pytest.approx(G * (0.5 - 0.3 * np.sqrt(0.75)) / 2, rel=0.01)
+    assert run.measures["fallbacks"][1:].min() == 4
+
+
 DICE = {"version": 1, "time": {"duration": 3, "frame_rate": 60}, "seed": 3,
         "bodies": [{"kind": "icosahedron", "name": "dice", "radius": 0.2, "mass": 1, "count": 30,
                     "scatter": {"inside": [[-1.2, -1.2, -1.2], [1.2, 1.2, 1.2]], "speed": [0, 3]}, "angular_velocity": [3, 2, 6]}],

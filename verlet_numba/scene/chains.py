@@ -8,6 +8,7 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verlet_numba.scene.body import Integers, Shape
 
@@ -92,9 +93,15 @@ def strung(shape: Shape) -> list[Family]:
     return found
 
 
+def chained(shape: Shape) -> NDArray[np.bool_]:
+    """(C,) whether each stick is in a chain."""
+    found = np.zeros(len(shape.sticks), bool)
+    for family in families(shape):
+        found[family.items[family.items >= 0]] = True
+    return found
+
+
 def unchained(shape: Shape) -> Shape:
     """A shape with the sticks alone that are in no chain."""
-    left = np.ones(len(shape.sticks), bool)
-    for family in families(shape):
-        left[family.items[family.items >= 0]] = False
+    left = ~chained(shape)
     return replace(shape, sticks=shape.sticks[left], lengths=shape.lengths[left])

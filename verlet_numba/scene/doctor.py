@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.chains import chained
 from verlet_numba.scene.clearance import Surface, clearance
 from verlet_numba.scene.occupied import load_surfaces
 from verlet_numba.scene.overlap import overlaps
@@ -30,7 +31,7 @@ RESOLVED = 1e-3         # of the shortest stick: numbers further apart than this
 def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> list[Problem]:
     """Warnings about a scene and its placed bodies (`place`), each with its position in the file."""
     surfaces, _ = load_surfaces(scene, folder, source)
-    found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies), *coarse_lines(scene, bodies)]
+    found = [*meshes(bodies), *sticks(scene, bodies), *attachments(scene, bodies), *coarse_lines(scene, bodies)]
     if scene.effects.contact != "none":
         found += [*inside_colliders(scene, bodies, surfaces), *overlaps(scene, bodies), *selves(scene, bodies),
                   *cramped(scene, bodies), *slipping(scene, bodies), *rebounds(scene, bodies)]
@@ -45,8 +46,11 @@ def meshes(bodies: list[Body]) -> Warnings:
             yield ("bodies", index, "file"), note
 
 
-def sticks(bodies: list[Body]) -> Warnings:
-    """Sticks given one by one: repeated, without direction, far from their length, or between unequal masses."""
+def sticks(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Sticks given one by one: repeated, without direction, far from their length, or between unequal masses.
+
+    Of a chain that is solved as a whole, masses may be as they like.
+    """
     for index, body in enumerate(bodies):
         shape = body.shape
         if shape.kind != "particles" or not len(shape.sticks):
@@ -63,6 +67,8 @@ def sticks(bodies: list[Body]) -> Warnings:
             yield (*path, row), (f"starts {distance[row]:.4g} m long, but its length is {shape.lengths[row]:.4g} m: "
                                  f"the first steps pull it there with a jerk{others}")
         ratio = _mass_ratio(body, shape.sticks)
+        if scene.solver.order == "lines":
+            ratio[chained(shape)] = 1.0
         for row, others in _first(ratio > MASS_RATIO):
             yield (*path, row), (f"joins masses of {ratio[row]:.3g}:1, which few substeps leave stretched: "
                                  f"use more{others}")

@@ -345,3 +345,11 @@ def test_lines_of_cloth_in_few_substeps():
     assert paths(cloth % ("sequential", 5), "substeps a second") == []
     rope = "bodies: [{kind: rope, start: [0, 0, 0], end: [1, 0, 0], segments: 3, mass: 1}]\nsolver: {order: lines, substeps: 1}"
     assert paths(rope, "substeps a second") == []
+
+
+def test_masses_of_a_chain_that_is_solved_as_a_whole_may_be_as_they_like():
+    heavy = ("bodies: [{kind: particles, positions: [[0, 0, 0], [1, 0, 0], [2, 0, 0]%s], masses: [1, 1, 500%s], "
+             "sticks: [[0, 1], [1, 2]%s]}]\nsolver: {order: %s}")
+    assert paths(heavy % ("", "", "", "sequential"), "joins masses of 500:1") == ["bodies.0.sticks.1"]
+    assert paths(heavy % ("", "", "", "lines"), "joins masses") == []
+    assert paths(heavy % (", [1, 1, 0]", ", 1", ", [1, 3]", "lines"), "joins masses of 500:1") == ["bodies.0.sticks.1"]
