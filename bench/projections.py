@@ -1,4 +1,4 @@
-"""Cost of one distance projection: the simulator's runs against a naive loop over sticks.
+"""Cost of one distance projection: the simulator's runs against a naive loop over sticks, and against directions at the start.
 
 A projection is one real stick once; lanes that are masked out do not count. Every repetition starts from the same
 positions, about 3 % of a stick's length off.
@@ -17,6 +17,7 @@ from report import Figure, figure
 from timing import computed, interleaved
 
 from verlet_numba.kernels.relax import relax_runs
+from verlet_numba.kernels.relax_started import relax_started_runs
 from verlet_numba.run.engine import start
 from verlet_numba.scene.build import Model, build
 
@@ -26,6 +27,7 @@ CASES = {"icosahedra, 1,000 copies": icosahedra(1_000), "icosahedra, 10,000 copi
 BARS = {("icosahedra, 1,000 copies", "float32"): 1.6, ("icosahedra, 1,000 copies", "float64"): 3.2,
         ("cloth 40x40", "float32"): 3.0, ("cloth 40x40", "float64"): 4.2}                           # ns
 GAINS = {("icosahedra, 1,000 copies", "float32"): 8.0}                                              # naive / runs
+STARTED = 1.8           # the direction at the start of the substep against the present one
 PROJECTIONS = {True: 400_000, False: 3_000_000}         # a repetition, by `quick`
 REPETITIONS = {True: 7, False: 21}
 JITTER = 0.03
@@ -36,6 +38,13 @@ def relax(position, runs, passes):
     """`passes` over all runs in one call, so that the call itself does not count."""
     for _ in range(passes):
         relax_runs(position, runs, None, None, None)
+
+
+@njit
+def relax_started(position, previous, runs, marks, passes):
+    """The same along the direction at the start of the substep."""
+    for _ in range(passes):
+        relax_started_runs(position, previous, runs, None, None, None, marks, 0)
 
 
 def measure(quick: bool) -> Iterator[Figure]:
@@ -53,12 +62,15 @@ def compare(case: str, body: dict[str, Any], precision: str, quick: bool) -> Ite
     flat = naive.body_major(model)
     position, own = jittered(model.world.particles.position, flat, model)
     check(position, own, flat, model, (runs, passes))
-    jobs = [partial(repetition, relax, position, (runs, passes)), partial(repetition, naive.relax, own, (*flat[1:], passes))]
-    fast, slow = interleaved(REPETITIONS[quick], *jobs) * 1e9 / (passes * runs.active)
+    before = model.world.particles.position
+    jobs = [partial(repetition, relax, position, (runs, passes)), partial(repetition, naive.relax, own, (*flat[1:], passes)),
+            partial(repetition, relax_started, position, (before, runs, np.zeros_like(before[0]), passes))]
+    fast, slow, started = interleaved(REPETITIONS[quick], *jobs) * 1e9 / (passes * runs.active)
     at = (case, precision)
     yield figure(STUDY, case, f"runs, {precision}", "ns", fast, at_most=BARS.get(at))
     yield figure(STUDY, case, f"naive, {precision}", "ns", slow)
     yield figure(STUDY, case, f"naive / runs, {precision}", "x", slow / fast, at_least=GAINS.get(at))
+    yield figure(STUDY, case, f"step_start / runs, {precision}", "x", started / fast, at_most=STARTED)
 
 
 def repetition(relaxation: Any, start: NDArray[Any], arguments: tuple[Any, ...]) -> float:

@@ -6,6 +6,7 @@ It knows no groups, runs or blocks and shares no formula with the package: it is
 read beside them. Slow, in double precision, without care for degenerate cases.
 """
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -61,6 +62,110 @@ def relax_stick(x, w, stick, h, tolerance=0.0, approximate=False):
         x[i] -= w[i] * change * d / length
         x[j] += w[j] * change * d / length
     return True
+
+
+def relax_started_stick(x, previous, w, stick, h, tolerance=0.0, approximate=False, present=False, soft=False):
+    """SHAKE along r, the stick at the start of the substep: p - r (w_i + w_j) l has the length rest to first order in l.
+
+    In lengths, with C = (p.p - rest^2) / (2 p.r) |r|, it is XPBD along r; a present direction is relax_stick's.
+    """
+    i, j = stick.i, stick.j
+    p, r = x[j] - x[i], previous[j] - previous[i]
+    if present or stick.rest == 0:
+        return relax_stick(x, w, stick, h, tolerance, approximate)
+    if w[i] + w[j] == 0:
+        return False
+    length, alpha = np.linalg.norm(r), stick.compliance / h**2
+    C = (p @ p - stick.rest**2) / (2 * p @ r) * length if p @ r > 0 else 0.0
+    off = abs(C + alpha * stick.multiplier) if soft else abs(np.linalg.norm(p) - stick.rest)
+    if tolerance > 0 and off <= tolerance * stick.rest:
+        return False
+    if p @ r <= 0:
+        return True
+    change = -(C + alpha * stick.multiplier) / (w[i] + w[j] + alpha)
+    stick.multiplier += change
+    x[i] -= w[i] * change * r / length
+    x[j] += w[j] * change * r / length
+    return True
+
+
+def chains(shape):
+    """Numbers of the sticks of every chain of a shape, in the order of relaxation, and of those that are in none."""
+    ends = {frozenset(stick.tolist()): c for c, stick in enumerate(shape.sticks)}
+    found = []
+    if shape.layout[0] == "line":
+        found = [list(range(len(shape.sticks)))]
+    elif shape.layout[0] == "grid":
+        nx, ny = shape.layout[1:]
+        for di, dj in ((1, -1), (1, 1), (0, 1), (1, 0)):
+            for i, j in np.ndindex(nx, ny):
+                chain = []
+                if not (0 <= i - di < nx and 0 <= j - dj < ny):
+                    while 0 <= i + di < nx and 0 <= j + dj < ny:
+                        chain.append(ends.get(frozenset((i * ny + j, (i + di) * ny + j + dj))))
+                        i, j = i + di, j + dj
+                if chain and chain[0] is not None:
+                    found.append(chain)
+    elif not shape.rigid:
+        parts = [{*map(int, stick)} for stick in shape.sticks]
+        for part in parts:
+            while any(part & other and not part >= other for other in parts):
+                part.update(*(other for other in parts if part & other))
+        for part in map(set, sorted({tuple(sorted(part)) for part in parts})):
+            own = [c for c, stick in enumerate(shape.sticks) if stick[0] in part]
+            tips = [p for p in sorted(part) if (shape.sticks[own] == p).sum() == 1]
+            if len(own) > 1 and len(tips) == 2 and len(own) == len(part) - 1:
+                chain, at = [], tips[0]
+                while len(chain) < len(own):
+                    chain += [c for c in own if at in shape.sticks[c] and c not in chain]
+                    at = shape.sticks[chain[-1]].sum() - at
+                found.append(chain)
+    return found, sorted(set(range(len(shape.sticks))) - {c for chain in found for c in chain})
+
+
+def relax_chain(x, w, sticks, h, tolerance=0.0, approximate=False, again=True):
+    """All sticks of a chain at once, linearised: J W J^T + alpha as a dense matrix. Returns how many were relaxed, and fell back.
+
+    If a stick would change by more than twice its length, the chain is relaxed stick by stick. With `again`, it is solved
+    up to 16 times, until no stick changes by more than makes an error of 1e-4.
+    """
+    sticks = [stick for stick in sticks if w[stick.i] + w[stick.j] > 0]
+    if not sticks:
+        return 0, 0
+    C, jacobian, alpha = np.zeros(len(sticks)), np.zeros((len(sticks), len(x), 3)), np.zeros(len(sticks))
+    for c, stick in enumerate(sticks):
+        d = x[stick.j] - x[stick.i]
+        length = np.linalg.norm(d)
+        C[c] = length - stick.rest
+        if approximate:
+            C[c] = length * (1 - 2 * stick.rest**2 / (length**2 + stick.rest**2))
+        jacobian[c, stick.i], jacobian[c, stick.j] = -d / length, d / length
+        alpha[c] = stick.compliance / h**2
+    missing = C + alpha * [stick.multiplier for stick in sticks]
+    if tolerance > 0 and (abs(missing) <= tolerance * np.array([stick.rest for stick in sticks])).all():
+        return 0, 0
+    J = jacobian.reshape(len(sticks), -1)
+    change = np.linalg.solve(J @ (np.repeat(w, 3)[:, None] * J.T) + np.diag(alpha), -missing)
+    moved = w[:, None] * (J.T @ change).reshape(x.shape)
+    turned = max(np.linalg.norm(moved[stick.j] - moved[stick.i]) / stick.rest for stick in sticks)
+    if turned > 2:
+        for stick in sticks:
+            relax_stick(x, w, stick, h, 0.0, approximate)
+        return len(sticks), 1
+    x += moved
+    for stick, more in zip(sticks, change, strict=True):
+        stick.multiplier += more
+    fallen = 0
+    if again and turned**2 / 2 > 1e-4:
+        fallen = relax_chain(x, w, sticks, h, 0.0, approximate, again < 15 and again + 1)[1]
+    return len(sticks), fallen
+
+
+def relax_pieces(x, w, chain, *how):
+    """A chain with pins in it is several: each is left alone, or falls back, without the others."""
+    joints = [({one.i, one.j} & {other.i, other.j}).pop() for one, other in itertools.pairwise(chain)]
+    cuts = [0, *(c for c, joint in enumerate(joints, 1) if w[joint] == 0), len(chain)]
+    return sum((np.array(relax_chain(x, w, chain[a:b], *how)) for a, b in itertools.pairwise(cuts)), np.zeros(2, int))
 
 
 def relax_angle(x, w, corners, rest):
@@ -132,6 +237,7 @@ class Twin:
     number: int = 0                     # substeps done
     contacts: list = field(default_factory=list)
     relaxed: int = 0
+    fallen: int = 0                     # chains that fell back
 
     def __post_init__(self):
         scene, bodies = self.scene, self.bodies
@@ -159,13 +265,18 @@ class Twin:
         self.previous = self.x - velocity * self.h + self.acceleration() * self.h**2 / 2
 
     def find_constraints(self, per_copy):
-        self.sticks, self.angles, self.triangles = [], [], []
+        self.sticks, self.angles, self.triangles, self.chains, self.observed = [], [], [], [], []
+        chained = self.scene.solver.order == "lines"
         for body, copy in per_copy:
             first, shape = self.first[id(body), copy], body.shape
-            self.sticks += [Stick(*(first + shape.sticks[c]), shape.lengths[c], shape.compliance) for c in relaxation_order(shape)]
+            order = relaxation_order(shape)
+            sticks = {c: Stick(*(first + shape.sticks[c]), shape.lengths[c], shape.compliance) for c in order}
+            self.observed += sticks.values()
+            for chain in chains(shape)[0] if chained else []:
+                self.chains.append([sticks.pop(c) for c in chain])
+            self.sticks += sticks.values()
             self.angles += [(first + corners, rest) for corners, rest in zip(shape.angles, shape.angle_values, strict=True)]
             self.triangles += list(first + shape.triangles)
-        self.observed = list(self.sticks)
         start = {body.name: self.first[id(body), 0] for body in self.bodies}
         self.sticks += [Stick(start[a] + i, start[b] + j, 0.0, 0.0) for a, i, b, j in self.scene.attachments]
         rests = [stick.rest for stick in self.observed if stick.rest > 0]
@@ -202,12 +313,16 @@ class Twin:
         for body in self.whole:
             body.gather()
         self.foresee(a)
-        for stick in self.sticks:
+        for stick in itertools.chain(self.sticks, *self.chains):
             stick.multiplier = 0.0
         for iteration in range(solver.iterations):
             self.separate()
             for body in self.whole:
                 body.separate(first=iteration == 0)
+            for chain in self.chains:
+                relaxed, fallen = relax_pieces(self.x, self.w, chain, h, solver.tolerance, solver.square_root == "approximate",
+                                               self.owner[chain[0].i].shape.layout[0] != "grid")
+                self.relaxed, self.fallen = self.relaxed + relaxed, self.fallen + fallen
             for stick in self.sticks:
                 self.relaxed += relax_stick(self.x, self.w, stick, h, solver.tolerance, solver.square_root == "approximate")
             for corners, rest in self.angles:
@@ -283,10 +398,11 @@ class Twin:
         for _ in range(after - 1):
             self.substep()
         x, before, t = self.x.copy(), self.previous.copy(), self.number * self.h
-        touching, relaxed, self.relaxed = sum(contact.push > 0 for contact in self.contacts), self.relaxed, 0
+        touching, relaxed, fallen = sum(contact.push > 0 for contact in self.contacts), self.relaxed, self.fallen
+        self.relaxed = self.fallen = 0
         self.substep()
         v = (self.x - before) / (2 * self.h)
-        return x, v, self.measures(x, v, t) | {"contacts": touching, "relaxations": relaxed}
+        return x, v, self.measures(x, v, t) | {"contacts": touching, "relaxations": relaxed, "fallbacks": fallen}
 
     def measures(self, x, v, t):
         m = self.mass[:, None]

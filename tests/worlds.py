@@ -69,6 +69,24 @@ FREE = {
 """Gravity alone: runs, sticks and angles in free flight. Scenes made from it share one compiled frame loop."""
 
 
+CHAINS = {
+    "time": {"duration": 1, "frame_rate": 60},
+    "solver": {"order": "lines", "substeps": 6, "iterations": 2},
+    "effects": {"gravity": [0, 1, -9.81], "contact": "none"},
+    "bodies": [
+        {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 6], "mass": 0.2, "pinned": [0, 10]},
+        {"kind": "rope", "name": "line", "start": [0, 0, 0], "end": [0.5, 0, 1], "segments": 9, "mass": 0.5, "compliance": 1e-4,
+         "pinned": [0]},
+        {"kind": "rope", "name": "strings", "start": [0, 0, 0], "end": [0, 0.5, 1], "segments": 4, "mass": 0.5, "count": 3,
+         "scatter": {"inside": [[-2, -2, 2], [2, 2, 4]], "speed": [0, 3]}},
+        {"kind": "particles", "name": "arm", "positions": [[0.5, 0, 1], [0.8, 0, 1], [0.8, 0.4, 1], [0.4, 0.4, 1.2], [1, 1, 1],
+                                                           [2, 1, 1], [1, 2, 1]],
+         "masses": [1, 2, 50, 1, 1, 1, 1], "sticks": [[0, 1], [1, 2], [2, 3], [4, 5], [5, 6], [6, 4]]}],
+    "attachments": [["line", 9, "arm", 0]],
+    "output": {"precision": "float64"}}
+"""Everything that is solved as whole chains, and what is not: a ring of sticks and an attachment. Nothing touches."""
+
+
 CRATE = {"kind": "box", "name": "crate", "size": [0.4, 0.4, 0.4], "mass": 2, "position": [5, 0, 0.2]}
 
 

@@ -23,6 +23,7 @@ WHOLE, INTEGRATED = 0, 1                                # its stage: where a sub
 KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
 ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
 COLUMNS = 20
+RELAXED, TOUCHING, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3, 4    # Snapshot.counts
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
@@ -54,6 +55,31 @@ class Sticks(NamedTuple):
     ends: Array                 # (2, C) int 1
     rest: Array                 # (C,) real m
     weight: Array               # (2, C) real 1; as in Runs
+
+
+class Lines(NamedTuple):
+    """Families of parallel chains of distance constraints, each chain solved as a whole (kernels/relax_lines.py).
+
+    Number k of family r joins particles first[r] + k and first[r] + shift[r] + k and goes on from number k - shift[r].
+    """
+
+    first: Array                # (R,) int 1
+    shift: Array                # (R,) int 1
+    lanes: Array                # (R,) int 1
+    data: Array                 # (R,) int 1; where the family's constraints stand in the arrays below
+    rows: Array                 # (R,) int 1; the family is solved turned, a matrix of so many rows; 0: it is solved as it stands
+    active: Array               # (R,) int 1; constraints that are not masked out
+    settled: Array              # (R,) double 1; relative error of a stick that is left to the next pass
+    rest: Array                 # (C,) real m
+    diagonal: Array             # (C,) real 1/kg; w_i + w_j + compliance / h^2, a trace more; 0 masks a lane out
+    coupling: Array             # (C,) real 1/kg; w_i where the chain goes on, 0 at its first stick
+    vector: Array               # (3, V) real m; scratch of one family: from particle to particle
+    pivot: Array                # (V,) real SI; the diagonal of its systems, then the inverse of what elimination leaves
+    bond: Array                 # (V,) real SI; what is next to the diagonal
+    pull: Array                 # (V,) real SI; the right side, then the multipliers
+    moved: Array                # (3, W) real m; how far the particles are moved
+    turned: Array               # (3, T) real SI; pivot, bond and pull turned
+    marks: Array                # (V,) int 1; of each constraint's chain: 0 settled, 1 to be solved, 2 to be relaxed stick by stick
 
 
 class Angles(NamedTuple):
@@ -99,6 +125,18 @@ class Collided(NamedTuple):
 
     before: Array               # (3, n) real m; positions before the separation
     moved: Array                # (G,) int 1; particle of the body that the separation moved farthest, -1: none
+
+
+class Start(NamedTuple):
+    """Sticks corrected along their direction at the start of the substep, but for bodies that were hit or change much in it."""
+
+    before: Array | None        # (3, n) real m; positions before contacts; None: nothing touches
+    marks: Array                # (n,) real 1; 1: a particle of a body whose sticks take their present direction
+    marked: Array               # (1,) int 1; 0: there is none
+    first: Array                # (D,) int 1; first particle of bodies side by side
+    slots: Array                # (D,) int 1; particles of each
+    lanes: Array                # (D,) int 1; bodies
+    worst: Array                # (X,) real 1; scratch: the mark of each of them
 
 
 class Gravity(NamedTuple):
@@ -566,7 +604,8 @@ class Snapshot(NamedTuple):
 
     position: Array             # (3, n) real m
     before: Array               # (3, n) real m; one substep earlier
-    counts: Array               # (3,) int 1; relaxations since the last frame; contacts and relaxations of the kept frame
+    counts: Array               # (5,) int 1; relaxations since the last frame, contacts and relaxations of the kept frame,
+                                # fallbacks since the last frame and of the kept one
 
 
 class Stopwatch(NamedTuple):
@@ -590,7 +629,10 @@ class World(NamedTuple):
     runs_softness: Softness | None
     sticks: Sticks | None
     sticks_softness: Softness | None
+    start: Start | None         # None: sticks are corrected along their present direction
     angles: Angles | None
+    lines: Lines | None
+    lines_softness: Softness | None
     graph: Graph | None
     collided: Collided | None
     effects: Effects

@@ -6,7 +6,7 @@ the loop.
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.damping import damp
@@ -29,9 +29,11 @@ from verlet_numba.effects.touch import HULLS, MIXED, begin_touches, touch_collid
 from verlet_numba.effects.wind import blow
 from verlet_numba.kernels.integrate import integrate
 from verlet_numba.kernels.observe import keep, observe, record, record_velocity
-from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
+from verlet_numba.kernels.relax import forget
 from verlet_numba.kernels.relax_angles import relax_angles
 from verlet_numba.kernels.relax_graph import relax_graph
+from verlet_numba.kernels.relax_lines import relax_lines
+from verlet_numba.kernels.relax_started import guard, note_start, relax_runs_along, relax_sticks_along
 from verlet_numba.kernels.stopwatch import (
     ANSWERING,
     DAMPING,
@@ -60,8 +62,8 @@ def advance(world, frames, budget):
     Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
-    particles, runs, runs_softness, sticks, sticks_softness, angles, graph, collided = world[:8]
-    effects, solver, observed, snapshot, clock, stopwatch = world[8:]
+    particles, runs, runs_softness, sticks, sticks_softness, start, angles, lines, lines_softness, graph, collided = world[:11]
+    effects, solver, observed, snapshot, clock, stopwatch = world[11:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
@@ -112,6 +114,7 @@ def advance(world, frames, budget):
                 gather(position, hulls)
                 gather(position, points)
             lap(stopwatch, FINDING)
+            note_start(position, start)
             foresee(position, acceleration, contact, restitution, h)
             begin_touches(rigid, touches)
             touch_colliders(contact, friction, restitution, rigid, touches)
@@ -130,6 +133,7 @@ def advance(world, frames, budget):
             strike_spheres(position, previous, inverse_mass, acceleration, spheres, restitution, h)
             forget(runs_softness)
             forget(sticks_softness)
+            forget(lines_softness)
             note_places(position, collided)
             lap(stopwatch, WEIGHING)
             for again in range(passes):
@@ -149,10 +153,15 @@ def advance(world, frames, budget):
                 lap(stopwatch, ANSWERING)
                 if not again:
                     choose_lists(position, collided, graph)                 # of the particles moved most (P9)
-                snapshot.counts[0] += relax_graph(position, graph, tolerance, approximate)
-                snapshot.counts[0] += relax_runs(position, runs, runs_softness, tolerance, approximate)     # P6-P10
-                snapshot.counts[0] += relax_sticks(position, sticks, sticks_softness, tolerance, approximate)
-                snapshot.counts[0] += relax_angles(position, inverse_mass, angles, tolerance)
+                    guard(position, previous, runs, sticks, start, snapshot.counts)
+                snapshot.counts[RELAXED] += relax_graph(position, graph, tolerance, approximate)
+                snapshot.counts[RELAXED] += relax_runs_along(position, previous, runs, runs_softness, tolerance,
+                                                             approximate, start)                    # P6-P10
+                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate,
+                                                        snapshot.counts)
+                snapshot.counts[RELAXED] += relax_sticks_along(position, previous, sticks, sticks_softness, tolerance,
+                                                               approximate, start)
+                snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)
                 lap(stopwatch, RELAXATION)
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)

@@ -17,8 +17,8 @@ OCCURS = {
     "narrow.collide": {"meet", "mixed"}, "sphere_tree.list_pairs": {"spheres"}, "sphere_tree.list_against": {"mixed"},
     "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
-    "relax_graph.sort_bodies": {"graph", "collided"}, "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"},
-    "stopwatch.reading": {"stopwatch"}}
+    "relax_graph.sort_bodies": {"graph", "collided"}, "relax_lines.solve": {"lines"}, "relax_started.part": {"start"},
+    "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"}, "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
@@ -31,6 +31,8 @@ SOFT = {"trees", "spheres"}
 MIX = {*SOFT, "points", "mixed"}
 MEET = {"hulls", "meet"}
 WHOLE = {"rigid", "touches"}
+CONSTRAINTS = {"paper": {"graph", "collided"}, "chains": {"lines"}, "step start": {"start"}}
+"""Parts of the world, beside effects, that scenes have."""
 SCENES = {
     "everything": (worlds.EVERYTHING, EFFECTS - {"features"}),
     "paper": (worlds.PAPER, EFFECTS - WHOLE),
@@ -41,6 +43,8 @@ SCENES = {
                              {"gravity", "contact", "trees", "points", "mixed", *WHOLE}),
     "free flight": (worlds.FREE, {"gravity", *SOFT}),
     "no effects": (worlds.with_changes(worlds.FREE, effects={"gravity": None}), SOFT),
+    "chains": (worlds.CHAINS, {"gravity"}),
+    "step start": (worlds.with_changes(worlds.FREE, solver={"gradient": "step_start"}, effects={"contact": "none"}), {"gravity"}),
     "no contact": (worlds.with_changes(worlds.FREE, effects={"contact": "none"}), {"gravity"})}
 
 
@@ -66,7 +70,8 @@ def test_world_holds_only_what_is_called_for(name):
     scene, wanted = SCENES[name]
     world = worlds.built(scene).world
     assert {field for field in EFFECTS if getattr(world.effects, field) is not None} == wanted
-    assert (world.graph is None, world.collided is None) == (name != "paper",) * 2
+    there = {part for parts in CONSTRAINTS.values() for part in parts if getattr(world, part) is not None}
+    assert there == CONSTRAINTS.get(name, set())
     if world.effects.meet is not None:
         assert (world.effects.meet.manifold is None) == (name == "paper")
 
@@ -76,8 +81,7 @@ def test_frame_loop_holds_only_what_is_called_for(name):
     scene, wanted = SCENES[name]
     found = functions(worlds.built(scene))
     assert {"relax.relax_runs", "relax_angles.relax_angles", "observe.observe"} <= found
-    if name == "paper":
-        wanted = wanted | {"graph", "collided"}
+    wanted = wanted | CONSTRAINTS.get(name, set())
     expected = {function for function, any_of in OCCURS.items() if any_of & wanted}
     assert found & set(OCCURS) == expected
 

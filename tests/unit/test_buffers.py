@@ -26,6 +26,8 @@ SCENES = {
     "single": worlds.with_changes(worlds.EVERYTHING, solver={"precision": "float32"}, output={"precision": "float32"}),
     "free": worlds.FREE,
     "paper": worlds.PAPER,
+    "chains": worlds.CHAINS,
+    "step start": worlds.with_changes(worlds.EVERYTHING, solver={"gradient": "step_start"}),
     "empty": {"time": {"duration": 1}, "effects": {}},
     "meshes": worlds.with_changes(worlds.EVERYTHING, colliders=[
         {"kind": "mesh", "file": str(Path(__file__).parents[2] / "scenes/gallery/bowl.obj")}, {"kind": "plane"}]),

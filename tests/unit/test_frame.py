@@ -30,6 +30,15 @@ def test_every_frame_is_that_of_the_twin(twin):
         np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(18, -1), rtol=1e-5, atol=1e-5, err_msg=name)
 
 
+def test_frames_of_whole_chains_are_those_of_the_twin():
+    chained = Twin(*worlds.placed(worlds.CHAINS)).frames(20)
+    positions, _, measures = worlds.advanced(worlds.started(worlds.CHAINS), 20)
+    np.testing.assert_allclose(positions, chained[0], atol=1e-8)
+    for name, columns in {**MEASURES, "fallbacks": [b.FALLBACKS]}.items():
+        np.testing.assert_allclose(measures[:, columns], chained[2][name].reshape(20, -1), rtol=1e-6, atol=1e-6, err_msg=name)
+    assert np.ptp(positions, axis=0).max() > 0.3
+
+
 def test_the_scene_of_the_twin_calls_for_everything(twin):
     """Else the test above could not fail."""
     effects = worlds.built(worlds.APART).world.effects._asdict()

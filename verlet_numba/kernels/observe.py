@@ -11,12 +11,18 @@ from verlet_numba.buffers import (
     CONTACTS,
     ERROR_MAX,
     ERROR_RMS,
+    FALLBACKS,
+    FALLEN,
+    FALLEN_KEPT,
     KINETIC,
     MOMENTUM,
     POTENTIAL,
     RELAXATIONS,
+    RELAXED,
+    RELAXED_KEPT,
     SPEED_MAX,
     TOTAL,
+    TOUCHING,
 )
 
 FAR = 1e30
@@ -30,7 +36,10 @@ def keep(position, previous, snapshot, contacts):
         now, earlier = position[axis], previous[axis]
         for k in range(now.size):
             place[k], before[k] = now[k], earlier[k]
-    snapshot.counts[1], snapshot.counts[2], snapshot.counts[0] = contacts, snapshot.counts[0], 0
+    counts = snapshot.counts
+    counts[TOUCHING] = contacts
+    counts[RELAXED_KEPT], counts[RELAXED] = counts[RELAXED], 0
+    counts[FALLEN_KEPT], counts[FALLEN] = counts[FALLEN], 0
 
 
 @kernel
@@ -60,7 +69,8 @@ def observe(row, position, snapshot, observed, h):
     row[:] = 0.0
     energies(row, position, snapshot, observed, h)
     constraint_errors(row, snapshot.position, observed.pairs, observed.rest)
-    row[CONTACTS], row[RELAXATIONS] = snapshot.counts[1], snapshot.counts[2]
+    row[CONTACTS], row[RELAXATIONS] = snapshot.counts[TOUCHING], snapshot.counts[RELAXED_KEPT]
+    row[FALLBACKS] = snapshot.counts[FALLEN_KEPT]
     return np.isfinite(row[KINETIC]) and np.isfinite(row[ERROR_RMS]) and row[SPEED_MAX] < FAR and in_space(snapshot.position)
 
 

@@ -18,6 +18,12 @@ def stretch(squared, rest):
 
 
 @formula
+def excess(squared, rest):
+    """d (d - rest) [m^2], the same times d^2: without a division."""
+    return squared - rest * math.sqrt(squared)
+
+
+@formula
 def stretch_approximate(squared, rest):
     """The same without a square root, first order in d / rest - 1 (Jakobsen 2001).
 

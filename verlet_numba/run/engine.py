@@ -53,7 +53,7 @@ def restate(model: Model, chunk: Frames) -> None:
     world, h, row = model.world, model.world.solver.step, chunk.measures[0]
     position, velocity = initial(model)
     deepest = row[PENETRATION]
-    snapshot = Snapshot(position, position - h * velocity, gate(np.zeros(3), np.int64))
+    snapshot = Snapshot(position, position - h * velocity, gate(np.zeros(5), np.int64))
     observe(row, position + h * velocity, snapshot, world.observed, h)
     row[PENETRATION] = deepest
     record_velocity(chunk.velocity, 0, position + h * velocity, snapshot.before, world.observed.scene_order, h)

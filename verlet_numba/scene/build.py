@@ -18,6 +18,7 @@ from verlet_numba.buffers import (
     Particles,
     Snapshot,
     Solver,
+    Start,
     World,
     gate,
 )
@@ -26,6 +27,7 @@ from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import carried
 from verlet_numba.scene.constraint_graph import graph_of
 from verlet_numba.scene.constraints import constraints
+from verlet_numba.scene.lines import lines_of, loose
 from verlet_numba.scene.meeting import contact_of
 from verlet_numba.scene.numbering import Numbering, number, padded, spread
 from verlet_numba.scene.schema import Scene
@@ -52,7 +54,8 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     Files of mesh colliders are sought from `folder`.
     """
     real = np.dtype(scene.solver.precision)
-    numbering = number(bodies)
+    chained = scene.solver.order == "lines"
+    numbering = number(bodies, lines=chained)
     size = padded(numbering.size, real.itemsize)
     step = 1.0 / (scene.time.frame_rate * scene.solver.substeps)
     masses = [np.broadcast_to(body.shape.masses, index.shape) for body, index in zip(bodies, numbering.bodies, strict=True)]
@@ -62,16 +65,21 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     together = attachments(scene, bodies, numbering)
     effects = effects_of(scene, folder, bodies, numbering, together, inverse_mass, step, real)
     ordered = scene.solver.order == "constraint_graph"
-    joined = constraints(bodies, numbering, together, inverse_mass, step, scene.solver.iterations, real, rigid=not ordered)
+    passes = scene.solver.iterations
+    singly = loose(bodies, numbering) if chained else (bodies, numbering)
+    joined = constraints(*singly, together, inverse_mass, step, passes, real, rigid=not ordered)
+    lines = lines_of(bodies, numbering, inverse_mass, step, real) if chained else (None, None)
     graph = graph_of(bodies, numbering, inverse_mass, scene.solver.repeats, real) if ordered else None
     collided = collided_of(graph, size, real)
-    solver = Solver(step, scene.solver.substeps, scene.solver.iterations,
+    started = start_of(numbering, effects, size, real) if scene.solver.gradient == "step_start" else None
+    solver = Solver(step, scene.solver.substeps, passes,
                     scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
     particles, snapshot = state(size, inverse_mass, effects, real)
     observed = observed_of(scene, bodies, numbering)
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
-    world = World(particles, *joined, graph, collided, effects, solver, observed, snapshot, clock, None)
+    world = World(particles, *joined[:-1], started, joined.angles, *lines, graph, collided, effects, solver, observed, snapshot,
+                  clock, None)
     return Model(scene, bodies, numbering, world)
 
 
@@ -80,6 +88,16 @@ def collided_of(graph: Graph | None, size: int, real: Any) -> Collided | None:
     if graph is None:
         return None
     return Collided(gate(np.zeros((3, size)), real), gate(np.full(len(graph.bucket), -1), np.int64))
+
+
+def start_of(numbering: Numbering, effects: Effects, size: int, real: Any) -> Start:
+    """What the directions at the start of a substep need."""
+    touches = any(effect is not None for effect in (effects.contact, effects.meet, effects.spheres, effects.mixed))
+    blocks = [(group.first + block * group.slots * group.block, group.slots, group.block)
+              for group in numbering.groups for block in range(group.blocks)]
+    first, slots, lanes = (gate(column, np.int64) for column in np.array(blocks, np.int64).reshape(-1, 3).T)
+    return Start(gate(np.zeros((3, size)), real) if touches else None, gate(np.zeros(size), real), gate(np.zeros(1), np.int64),
+                 first, slots, lanes, gate(np.zeros(lanes.max(initial=1)), real))
 
 
 def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -98,7 +116,7 @@ def state(size: int, inverse_mass: Floats, effects: Effects, real: Any) -> tuple
     accelerates = any(effect is not None for effect in (effects.gravity, effects.wind, effects.drag, effects.damping))
     rows = [gate(np.zeros((3, size)), real) for _ in range(5)]
     particles = Particles(rows[0], rows[1], gate(inverse_mass, real), rows[2] if accelerates else None)
-    return particles, Snapshot(rows[3], rows[4], gate(np.zeros(3), np.int64))
+    return particles, Snapshot(rows[3], rows[4], gate(np.zeros(5), np.int64))
 
 
 def observed_of(scene: Scene, bodies: list[Body], numbering: Numbering) -> Observed:

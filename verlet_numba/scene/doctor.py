@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verlet_numba.scene.body import Body, Floats, Integers
+from verlet_numba.scene.chains import chained
 from verlet_numba.scene.clearance import Surface, clearance
 from verlet_numba.scene.occupied import load_surfaces
 from verlet_numba.scene.overlap import overlaps
@@ -23,13 +24,14 @@ Warnings = Iterator[tuple[Key, str]]
 TOUCH = 1e-6            # of a body's size: overlap up to this is touching
 STRETCH = 0.01          # relative length error at the start that is worth a word
 MASS_RATIO = 100.0      # of particles joined to each other, above which few passes leave visible stretch
+FEW_LINES = 360.0       # substeps a second below which cloth that is solved in lines comes apart (6 at 60 frames a second)
 RESOLVED = 1e-3         # of the shortest stick: numbers further apart than this spoil its length
 
 
 def examine(scene: Scene, bodies: list[Body], folder: Path, source: Source) -> list[Problem]:
     """Warnings about a scene and its placed bodies (`place`), each with its position in the file."""
     surfaces, _ = load_surfaces(scene, folder, source)
-    found = [*meshes(bodies), *sticks(bodies), *attachments(scene, bodies)]
+    found = [*meshes(bodies), *sticks(scene, bodies), *attachments(scene, bodies), *coarse_lines(scene, bodies)]
     if scene.effects.contact != "none":
         found += [*inside_colliders(scene, bodies, surfaces), *overlaps(scene, bodies), *selves(scene, bodies),
                   *slipping(scene, bodies), *rebounds(scene, bodies)]
@@ -44,8 +46,11 @@ def meshes(bodies: list[Body]) -> Warnings:
             yield ("bodies", index, "file"), note
 
 
-def sticks(bodies: list[Body]) -> Warnings:
-    """Sticks given one by one: repeated, without direction, far from their length, or between unequal masses."""
+def sticks(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Sticks given one by one: repeated, without direction, far from their length, or between unequal masses.
+
+    Of a chain that is solved as a whole, masses may be as they like.
+    """
     for index, body in enumerate(bodies):
         shape = body.shape
         if shape.kind != "particles" or not len(shape.sticks):
@@ -62,6 +67,8 @@ def sticks(bodies: list[Body]) -> Warnings:
             yield (*path, row), (f"starts {distance[row]:.4g} m long, but its length is {shape.lengths[row]:.4g} m: "
                                  f"the first steps pull it there with a jerk{others}")
         ratio = _mass_ratio(body, shape.sticks)
+        if scene.solver.order == "lines":
+            ratio[chained(shape)] = 1.0
         for row, others in _first(ratio > MASS_RATIO):
             yield (*path, row), (f"joins masses of {ratio[row]:.3g}:1, which few substeps leave stretched: "
                                  f"use more{others}")
@@ -105,6 +112,14 @@ def attachments(scene: Scene, bodies: list[Body]) -> Warnings:
         elif not any(held) and max(masses) > MASS_RATIO * min(masses):
             yield path, (f"joins masses of {max(masses) / min(masses):.3g}:1, which few passes leave apart: use more "
                          "substeps")
+
+
+def coarse_lines(scene: Scene, bodies: list[Body]) -> Warnings:
+    """Lines of cloth in steps so long that they are no longer nearly straight from one to the next."""
+    woven = any(body.shape.kind == "cloth" for body in bodies)
+    if scene.solver.order == "lines" and woven and substeps_a_second(scene) < FEW_LINES:
+        yield ("solver", "order"), (f"`lines` of cloth take at least {FEW_LINES:g} substeps a second, here they have "
+                                    f"{substeps_a_second(scene):g}: use more substeps, or `sequential`")
 
 
 def inside_colliders(scene: Scene, bodies: list[Body], surfaces: dict[int, Surface]) -> Warnings:

@@ -4,7 +4,8 @@ A group holds all copies of all bodies of one topology. Its particles take slots
 the index first + (k // B) S B + s B + k % B, for S slots and blocks of B copies. Slots are chosen so that the
 constraints of a rope or a cloth are runs of their own: a rope's even particles come before its odd ones, a cloth is
 four blocks by the parity of row and column, each row one ghost longer than needed, so that neighbours in a block's
-row-major order are neighbours in the cloth or one of them is a ghost.
+row-major order are neighbours in the cloth or one of them is a ghost. Where chains are solved as a whole, slots follow
+them instead (chains.py).
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
+from verlet_numba.scene.chains import slots_along
 
 BLOCK_SLOTS = 3072      # slots of a block: 12 particles of icosahedra x 256 lanes; 128 lanes take 12 % longer in float32
 SMALL_SLOTS = 4096      # a group up to this size is a single block
@@ -85,15 +87,15 @@ def topology(shape: Shape) -> tuple[object, ...]:
     return (shape.layout, len(shape.positions), shape.sticks.tobytes(), shape.angles.tobytes(), shape.triangles.tobytes())
 
 
-def number(bodies: list[Body]) -> Numbering:
-    """Give every particle its inner index."""
+def number(bodies: list[Body], *, lines: bool = False) -> Numbering:
+    """Give every particle its inner index. lines: chains of sticks are solved as a whole."""
     members: dict[tuple[object, ...], list[int]] = {}
     for b, body in enumerate(bodies):
         members.setdefault(topology(body.shape), []).append(b)
     groups, indices, first = [], dict[int, Integers](), 0
     for group_members in members.values():
         shape = bodies[group_members[0]].shape
-        slot, count = slots(shape)
+        slot, count = slots_along(shape) if lines else slots(shape)
         copies = sum(bodies[b].copies for b in group_members)
         block = block_size(count, copies)
         group = Group(shape, tuple(group_members), slot, count, block, -(-copies // block), copies, first)

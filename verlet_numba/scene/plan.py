@@ -8,6 +8,7 @@ import numpy as np
 from verlet_numba.buffers import COLUMNS, Effects, World
 from verlet_numba.scene.body import Shape
 from verlet_numba.scene.build import Model
+from verlet_numba.scene.chains import unchained
 from verlet_numba.scene.numbering import Group
 from verlet_numba.scene.prepare import Prepared
 from verlet_numba.scene.schema import Scene
@@ -65,7 +66,13 @@ def lanes(model: Model, group: Group) -> str:
     first, last = group.first, group.first + group.size
     runs = model.world.runs
     mine = [] if runs is None else [int(n) for i, n in zip(runs.first[0], runs.lanes, strict=True) if first <= i < last]
-    return f"{len(mine)} runs of up to {max(mine)} lanes" if mine else "stick by stick"
+    runs_of = f"{len(mine)} runs of up to {max(mine)} lanes" if mine else "stick by stick"
+    lines = model.world.lines
+    chains = [] if lines is None else [int(n) for i, n in zip(lines.first, lines.shift, strict=True) if first <= i < last]
+    if not chains:
+        return runs_of
+    told = f"{len(chains)} families of chains, up to {max(chains)} side by side"
+    return f"{told}; the others {runs_of}" if len(unchained(group.shape).sticks) else told
 
 
 def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
@@ -155,16 +162,21 @@ def soft_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phase
 
 def constraints(world: World) -> Iterator[Phase]:
     """Relaxation."""
-    solver, ordered = world.solver, " outside of the constraint graph" if world.graph else ""
+    solver = world.solver
+    ordered = " outside of the constraint graph" if world.graph else " but for chains" if world.lines else ""
     yield Phase("constraint graph", world.graph is not None, "solver.order is constraint_graph" if world.graph
-                else "solver.order is sequential, or there is no rigid body")
+                else "solver.order is another, or there is no rigid body")
+    yield Phase("lines", world.lines is not None, "solver.order is lines: whole chains of sticks" if world.lines
+                else "solver.order is another, or there is no chain of sticks")
     yield Phase("runs of sticks", world.runs is not None, "ropes, cloth or several bodies of one kind" if world.runs
                 else f"no rope, no cloth, no body in several copies{ordered}")
     yield Phase("single sticks", world.sticks is not None, "bodies without copies, or attachments" if world.sticks
                 else f"no single body with sticks{ordered}, no attachment")
-    soft = world.runs_softness is not None or world.sticks_softness is not None
+    soft = any(softness is not None for softness in (world.runs_softness, world.sticks_softness, world.lines_softness))
     yield Phase("compliance over passes", soft, "a body is compliant and there are several passes" if soft
                 else "no body is compliant, or one pass a substep, where it is part of the weights")
+    yield Phase("directions at the start of the step", world.start is not None,
+                f"solver.gradient is {'step_start' if world.start else 'current'}")
     yield Phase("tolerance", solver.tolerance is not None,
                 "solver.tolerance is above 0" if solver.tolerance else "solver.tolerance is 0: every stick is relaxed")
     yield Phase("angles", world.angles is not None, "a body keeps angles" if world.angles else "no body keeps angles")

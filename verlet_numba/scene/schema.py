@@ -71,13 +71,17 @@ class Solver(Part):
         default=False, description="whether rigid bodies that were turned inside out are restored")
     gradient: Literal["current", "step_start"] = Field(
         default="current", description="direction of a stick's correction: the present one, or that at the start of "
-                                       "the step")
+                                       "the step, second order; of bodies that are hit or turn fast the present one")
     square_root: Literal["exact", "approximate"] = Field(
         default="exact", description="`approximate`: one Newton step from the rest length (Jakobsen 2001)")
     precision: Literal["float64", "float32"] = Field(default="float64", description="of the simulation")
     broad_phase: Literal["sweep", "all_pairs"] = Field(
         default="sweep", description="how pairs of rigid bodies that may touch are found: `sweep` through a "
                                       "hierarchy of grids")
+
+    def findings(self) -> Iterable[Finding]:
+        if self.gradient == "step_start" and self.order != "sequential":
+            yield ("gradient",), f"step_start is for order sequential, not for {self.order}: use `current`, or another order"
 
     @model_validator(mode="before")
     @classmethod

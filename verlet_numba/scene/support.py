@@ -34,8 +34,6 @@ def _is_not(word: object) -> Callable[[Any], bool]:
 _LEAVE_OUT = "leave the key out"
 
 NOT_BUILT = (
-    Missing("solver.order", _is("lines"), "use `sequential`"),
-    Missing("solver.gradient", _is("step_start"), "use `current`"),
     Missing("solver.deformable_contact", _is("exact"), "use `spheres`"),
     Missing("solver.orientation_guard", _is(True), _LEAVE_OUT),
     Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),

@@ -17,7 +17,7 @@ def kept(request):
     order = rng.permutation(15)[:10]
     pairs, rest = order[[[0, 2, 3], [1, 7, 4]]], np.array([1.0, 0.5, 0.0])
     observed = b.Observed(order, rng.uniform(0.5, 2, 10), rng.normal(size=(3, 10)), pairs, rest)
-    return after, b.Snapshot(place, before, np.array([5, 3, 11])), observed
+    return after, b.Snapshot(place, before, np.array([5, 3, 11, 2, 6])), observed
 
 
 def test_sums_over_the_particles_of_the_file(kept):
@@ -29,7 +29,8 @@ def test_sums_over_the_particles_of_the_file(kept):
     v = (after.T.astype(float) - snapshot.before.T)[order] / (2 * H)
     kinetic, potential = (m * v * v).sum() / 2, -(m * x * observed.gravity.T).sum()
     expected = {b.KINETIC: kinetic, b.POTENTIAL: potential, b.TOTAL: kinetic + potential,
-                b.SPEED_MAX: np.linalg.norm(v, axis=1).max(), b.CONTACTS: 3, b.RELAXATIONS: 11}
+                b.SPEED_MAX: np.linalg.norm(v, axis=1).max(), b.CONTACTS: 3, b.RELAXATIONS: 11,
+                b.FALLBACKS: 6}
     np.testing.assert_allclose(row[list(expected)], list(expected.values()), rtol=1e-12)
     for column, vector in ((b.MOMENTUM, (m * v).sum(0)), (b.ANGULAR, (m * np.cross(x, v)).sum(0)),
                            (b.CENTRE, (m * x).sum(0) / m.sum())):
@@ -70,4 +71,4 @@ def test_keep_copies_the_state_and_moves_the_counts_on(kept):
     keep(after, previous, snapshot, 7)
     np.testing.assert_array_equal(snapshot.position, after)
     np.testing.assert_array_equal(snapshot.before, previous)
-    np.testing.assert_array_equal(snapshot.counts, [0, 7, 5])
+    np.testing.assert_array_equal(snapshot.counts, [0, 7, 5, 0, 2])

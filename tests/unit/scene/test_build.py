@@ -94,14 +94,15 @@ def test_compliance_needs_memory_only_over_several_passes():
 
 # --- A body does not feel who else is there ---------------------------------------------------------------------------
 
-def dice(kind, precision):
+def dice(kind, precision, contact="auto", **solver):
     """300 copies of a body that fly and tumble, and the scene; a rope and single sticks keep them company."""
     body = {"box": {"kind": "box", "size": [0.1, 0.2, 0.3]}, "icosahedron": {"kind": "icosahedron", "radius": 0.1},
             "rope": {"kind": "rope", "start": [0, 0, 0], "end": [0.1, 0.05, 0], "segments": 3, "length": 0.2},
             "cloth": {"kind": "cloth", "size": [0.2, 0.1], "resolution": [3, 4]}}[kind]
     many = {**body, "name": "many", "mass": 1, "count": 300, "angular_velocity": [3, 1, -8],
             "scatter": {"inside": [[-5, -5, 0], [5, 5, 9]], "speed": [1, 4]}}
-    return worlds.placed(worlds.with_changes(worlds.FREE, solver={"precision": precision}, bodies=[*COMPANY, many]))
+    return worlds.placed(worlds.with_changes(worlds.FREE, solver={"precision": precision, **solver},
+                                             effects={"contact": contact}, bodies=[*COMPANY, many]))
 
 
 def trajectory(scene, bodies):
@@ -119,6 +120,19 @@ def part(body, first, last):
 @pytest.mark.parametrize("kind", ["box", "icosahedron", "rope", "cloth"])
 def test_alone_among_copies_or_in_a_group_the_bits_are_the_same(kind, precision):
     scene, (*company, many) = dice(kind, precision)
+    same_bits(scene, company, many)
+
+
+@pytest.mark.parametrize(("kind", "key", "value"), [
+    ("rope", "order", "lines"), ("cloth", "order", "lines"), ("box", "gradient", "step_start"),
+    ("cloth", "gradient", "step_start")])
+def test_they_are_in_whole_chains_and_along_directions_at_the_start(kind, key, value):
+    scene, (*company, many) = dice(kind, "float64", "none", **{key: value})
+    same_bits(scene, company, many)
+
+
+def same_bits(scene, company, many):
+    """A body flies alike alone, among copies, and in a group with others."""
     together = trajectory(scene, [*company, many])
     assert np.abs(together[-1] - together[0]).max() > 0.1
     for first, last in ((0, 1), (299, 300), (128, 129), (5, 8), (7, 16), (100, 229)):

@@ -320,3 +320,20 @@ def test_what_slips_between_the_particles_of_a_cloth():
     assert paths(cloth % ", {kind: box, name: bar, size: [0.6, 9, 0.1], mass: 1}", "body bar is 0.6 m wide") == ["bodies.0"]
     assert paths(cloth % ", {kind: box, name: bar, size: [0.61, 9, 0.1], mass: 1}", "may slip between") == []
     assert paths("bodies: [{kind: box, size: [1, 1, 1], mass: 1, position: [0, 0, 2]}]" + SLIPPING % 0.3, "may slip") == []
+
+
+def test_lines_of_cloth_in_few_substeps():
+    cloth = "bodies: [{kind: cloth, size: [1, 1], resolution: [3, 3], mass: 1}]\nsolver: {order: %s, substeps: %d}"
+    assert paths(cloth % ("lines", 5), "at least 360 substeps a second, here they have 300") == ["solver.order"]
+    assert paths(cloth % ("lines", 6), "substeps a second") == []
+    assert paths(cloth % ("sequential", 5), "substeps a second") == []
+    rope = "bodies: [{kind: rope, start: [0, 0, 0], end: [1, 0, 0], segments: 3, mass: 1}]\nsolver: {order: lines, substeps: 1}"
+    assert paths(rope, "substeps a second") == []
+
+
+def test_masses_of_a_chain_that_is_solved_as_a_whole_may_be_as_they_like():
+    heavy = ("bodies: [{kind: particles, positions: [[0, 0, 0], [1, 0, 0], [2, 0, 0]%s], masses: [1, 1, 500%s], "
+             "sticks: [[0, 1], [1, 2]%s]}]\nsolver: {order: %s}")
+    assert paths(heavy % ("", "", "", "sequential"), "joins masses of 500:1") == ["bodies.0.sticks.1"]
+    assert paths(heavy % ("", "", "", "lines"), "joins masses") == []
+    assert paths(heavy % (", [1, 1, 0]", ", 1", ", [1, 3]", "lines"), "joins masses of 500:1") == ["bodies.0.sticks.1"]

@@ -168,7 +168,7 @@ def test_the_schema_for_editors_has_descriptions_and_defaults() -> None:
 
 
 def test_all_that_is_not_built_is_refused_where_it_stands() -> None:
-    text = FULL.replace("preset: default", "preset: paper").replace("order: sequential", "order: lines").replace(
+    text = FULL.replace("preset: default", "preset: paper").replace(
         "contact_geometry: nodes", "contact_geometry: segments")
     found = unsupported(loads(text, "s.yaml", ["effects.rest.time=1"]))
     assert [problem.path.replace(".5", ".*") for problem in found] == [row.path for row in NOT_BUILT]
@@ -188,8 +188,15 @@ def test_what_is_not_written_or_switched_off_is_no_matter() -> None:
 
 
 def test_an_override_that_is_not_built_is_refused_too() -> None:
-    problem, = unsupported(loads(SMALL, "s.yaml", ["solver.order=lines"]))
-    assert (problem.file, problem.column) == ("--set solver.order=lines", 8)
+    problem, = unsupported(loads(SMALL, "s.yaml", ["effects.bending={stiffness: 1}"]))
+    assert problem.file == "--set effects.bending={stiffness: 1}"
+    assert problem.column == 9
+
+
+@pytest.mark.parametrize("order", ["lines", "constraint_graph"])
+def test_directions_at_the_start_are_for_the_plain_order(order: str) -> None:
+    with pytest.raises(SceneError, match="step_start is for order sequential"):
+        loads(SMALL + f"solver: {{gradient: step_start, order: {order}}}\n", "s.yaml")
 
 
 def test_loading_needs_no_heavy_library() -> None:

@@ -25,11 +25,11 @@ def bodies_of(names):
     return [copies_of(SHAPES[name], copies) for name, copies in names]
 
 
-@given(names=BODIES)
+@given(names=BODIES, lines=st.booleans())
 @settings(deadline=None, max_examples=60)
-def test_every_particle_has_a_place_of_its_own(names):
+def test_every_particle_has_a_place_of_its_own(names, lines):
     bodies = bodies_of(names)
-    numbering = number(bodies)
+    numbering = number(bodies, lines=lines)
     order = numbering.scene_order
     assert len(order) == sum(body.positions.shape[0] * body.positions.shape[1] for body in bodies)
     assert len(np.unique(order)) == len(order)
@@ -41,10 +41,10 @@ def test_every_particle_has_a_place_of_its_own(names):
         first += index.size
 
 
-@given(names=BODIES)
+@given(names=BODIES, lines=st.booleans())
 @settings(deadline=None, max_examples=60)
-def test_copies_are_lanes_side_by_side_within_blocks(names):
-    numbering = number(bodies_of(names))
+def test_copies_are_lanes_side_by_side_within_blocks(names, lines):
+    numbering = number(bodies_of(names), lines=lines)
     for group in numbering.groups:
         index = np.concatenate([numbering.bodies[b] for b in group.members])
         assert len(index) == group.copies

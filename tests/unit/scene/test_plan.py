@@ -43,6 +43,8 @@ POST = "colliders: [{kind: cylinder, radius: 1, length: 2, position: [5, 5, 5]}]
     (MIXED, "", "deformable against rigid", "10 particles, 2 rigid bodies"),
     ([ROPE % ""], SELF, "self-contact", "effects.self_collision"),
     (MIXED, "effects: {rest: {}}", "rest", "effects.rest"),
+    ([ROPE % ""], "solver: {order: lines}", "lines", "solver.order is lines: whole chains of sticks"),
+    (TWO, "solver: {gradient: step_start}", "directions at the start of the step", "solver.gradient is step_start"),
 ])
 def test_phases_that_are_there(bodies, rest, phase, why):
     assert phases(bodies, rest)[phase] == (True, why)
@@ -68,7 +70,9 @@ def test_phases_that_are_there(bodies, rest, phase, why):
     (TWO, "", "contact with colliders", "the scene has no collider"),
     (TWO[:1], "effects: {restitution: 1}", "restitution", "nothing touches"),
     (TWO[:1], "effects: {friction: 1}", "friction", "nothing touches"),
-    (TWO, "", "constraint graph", "solver.order is sequential, or there is no rigid body"),
+    (TWO, "", "constraint graph", "solver.order is another, or there is no rigid body"),
+    (TWO, "solver: {order: lines}", "lines", "solver.order is another, or there is no chain of sticks"),
+    (TWO, "", "directions at the start of the step", "solver.gradient is current"),
 ])
 def test_phases_that_are_absent(bodies, rest, phase, why):
     assert phases(bodies, rest)[phase] == (False, why)
