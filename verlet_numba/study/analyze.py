@@ -67,12 +67,12 @@ def analyze(path: Path, names: Sequence[str] = (), body: str | None = None, reco
     Raises MeasureError for a measure or body that it has not, TrajectoryError for a file that cannot be read.
     """
     with reader.open(path) as trajectory:
-        wanted = list(names) or measurable(trajectory, USUAL, body, recorded)
         try:
+            wanted = list(names) or measurable(trajectory, USUAL, body, recorded)
             values = measure(trajectory, wanted, body, recorded)
         except (MeasureError, TrajectoryError):
             raise
-        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+        except (LookupError, AttributeError, TypeError, ValueError, ArithmeticError) as error:
             raise TrajectoryError(f"{path}: cannot be measured, its scene or its numbers are damaged ({error!r})") from error
         return Analysis(str(path), status_of(trajectory), trajectory.time, values,
                         {name: source(trajectory, name, body, recorded) for name in wanted})

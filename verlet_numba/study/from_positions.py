@@ -72,24 +72,18 @@ class Part:
         return corners[inside] - self.particles.start
 
     @cached_property
-    def colliders(self) -> list[tuple[dict[str, Any], Any, Any]]:
-        """As told by the scene, as a model that stands at the origin, and the surface of a mesh."""
-        from pydantic import TypeAdapter, ValidationError
+    def colliders(self) -> list[tuple[dict[str, Any], Any]]:
+        """As told by the scene, and as a model that stands at the origin."""
+        from pydantic import TypeAdapter
 
-        from verlet_numba.scene.occupied import surface_of
         from verlet_numba.scene.schema_colliders import Collider
-        from verlet_numba.scene.shapes import ShapeError
 
         adapter: TypeAdapter[Any] = TypeAdapter(Collider)
         found = []
         for told in self.trajectory.scene.get("colliders", ()):
-            try:
-                model = adapter.validate_python(told)
-                surface = surface_of(model, self.trajectory.path.parent) if model.kind == "mesh" else None
-            except (ValidationError, ShapeError, OSError):
-                continue        # the file of a mesh is not where the trajectory is
+            model = adapter.validate_python(told)
             where = "point" if model.kind == "plane" else "position"
-            found.append((told, model.model_copy(update={where: (0.0, 0.0, 0.0)}), surface))
+            found.append((told, model.model_copy(update={where: (0.0, 0.0, 0.0)})))
         return found
 
     @cached_property
@@ -188,21 +182,16 @@ def speed_max(part: Part, block: Block) -> Array:
 
 def penetration_max(part: Part, block: Block) -> Array:
     """Of particles, with their radius, in colliders. What hulls do to each other only a run records."""
+    from verlet_numba.scene.clearance import clearance
+
     deepest = np.zeros(len(block.time))
     if part.trajectory.scene.get("effects", {}).get("contact") == "none" or not block.position.shape[1]:
         return deepest
-    for told, model, surface in part.colliders:
+    for told, model in part.colliders:
         for frame, local in local_frames(told, block):
-            distance = clear(model, local.reshape(-1, 3), surface).reshape(local.shape[:-1])
+            distance = clearance(model, local.reshape(-1, 3)).reshape(local.shape[:-1])
             deepest[frame] = np.maximum(deepest[frame], (part.radii - distance).max(axis=-1))
     return deepest
-
-
-def clear(model: Any, points: Array, surface: Any) -> Array:
-    """Distance (N,) from a collider at the origin, negative inside; a sheet has no inside."""
-    from verlet_numba.scene.clearance import clearance
-
-    return clearance(model, points, surface)
 
 
 def local_frames(told: dict[str, Any], block: Block) -> list[tuple[Any, Array]]:

@@ -13,7 +13,7 @@ from verlet_numba.scene.prepare import Prepared, prepare
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Expect
 from verlet_numba.study import reader
-from verlet_numba.study.measures import UNITS, lengths, measure
+from verlet_numba.study.measures import UNITS, lengths, measurable, measure
 from verlet_numba.study.reader import Array, Trajectory
 
 IN_FULL = ("output.fields=[velocity]", "output.observables=true", "output.precision=float64", "output.precision_bits=24")
@@ -126,12 +126,16 @@ def trouble_of(summary: Summary) -> str:
 
 
 def judge(trajectory: Trajectory, expectations: Sequence[Expect]) -> list[Verdict]:
-    """Every expectation against the frames of a trajectory; each body is read once."""
-    names: dict[str | None, dict[str, None]] = {}
+    """Every expectation against the frames of a trajectory; each body is read once. What cannot be measured does not hold."""
+    named = {expected.body: [other.measure for other in expectations if other.body == expected.body] for expected in expectations}
+    found = {body: measure(trajectory, measurable(trajectory, dict.fromkeys(names), body), body) for body, names in named.items()}
+    verdicts = []
     for expected in expectations:
-        names.setdefault(expected.body, {})[expected.measure] = None
-    found = {body: measure(trajectory, list(wanted), body) for body, wanted in names.items()}
-    return [hold(expected, trajectory.time, lengths(found[expected.body][expected.measure])) for expected in expectations]
+        if expected.measure in found[expected.body]:
+            verdicts.append(hold(expected, trajectory.time, lengths(found[expected.body][expected.measure])))
+        else:
+            verdicts.append(Verdict(expected, False, None, None, "cannot be measured here"))
+    return verdicts
 
 
 def hold(expected: Expect, time: Array, values: Array) -> Verdict:

@@ -130,6 +130,17 @@ def test_what_cannot_be_measured_is_said(tmp_path, motion, names, body, words):
         measure(trajectory, names, body)
 
 
+def test_depth_in_a_mesh_is_what_the_run_recorded(tmp_path, motion):
+    """Its triangles are not in the trajectory."""
+    scene = {**SCENE, "colliders": [*SCENE["colliders"], {"kind": "mesh", "file": "bowl.obj", "name": "bowl"}]}
+    path = write(tmp_path / "x.vtkhdf", *motion, scene=scene, observables={"penetration_max": np.full(FRAMES, 0.5)})
+    with reader.open(path) as trajectory:
+        assert (measure(trajectory, ["penetration_max"])["penetration_max"] == 0.5).all()
+        assert measurable(trajectory, ["penetration_max"], recorded=False) == []
+        with pytest.raises(MeasureError, match="triangles of bowl"):
+            measure(trajectory, ["penetration_max"], "crate")
+
+
 @pytest.mark.parametrize(("speed", "expected"), [
     ([0, 0, 0], 0.0), ([1, 0, 0], 0.1), ([1, 0, 1, 0.0099], 0.3), ([1, 1], np.inf), ([0, 0.01], np.inf), ([], np.inf),
     ([0, np.nan, 0], 0.2)])

@@ -4,13 +4,15 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from trajectories import FRAMES, SCENE, write
 
 from verlet_numba.run.postmortem import Divergence
 from verlet_numba.run.simulate import Summary
 from verlet_numba.scene.load import loads
 from verlet_numba.scene.schema import COUNTED, Expect, Measure
+from verlet_numba.study import reader
 from verlet_numba.study.measures import UNITS, USUAL, VECTORS
-from verlet_numba.study.verify import Case, hold, scenes_in, trouble_of
+from verlet_numba.study.verify import Case, hold, judge, scenes_in, trouble_of
 
 TIME = np.arange(7) / 60
 VALUES = np.array([0.0, 3.0, 1.0, 2.0, -1.0, 5.0, 2.0])
@@ -60,6 +62,15 @@ def test_one_value_a_run(value, held):
     verdict = hold(expect(measure="rest_time", max=2), TIME, np.array([value]))
     assert verdict.held == held
     assert verdict.as_dict()["figure"] == (value if np.isfinite(value) else None)
+
+
+def test_what_cannot_be_measured_does_not_hold(tmp_path):
+    """How deep a body is in a mesh; the rest of what is expected of the body is judged."""
+    scene = {**SCENE, "colliders": [{"kind": "mesh", "file": "bowl.obj", "name": "bowl"}]}
+    position = np.zeros((FRAMES, 23, 3))
+    with reader.open(write(tmp_path / "x.vtkhdf", position, position, scene)) as trajectory:
+        found = judge(trajectory, [expect(measure=name, max=1, body="crate") for name in ("penetration_max", "speed_max")])
+    assert [(verdict.held, verdict.figure) for verdict in found] == [(False, None), (True, 0)]
 
 
 def test_a_run_that_diverged_fails_whatever_held():
