@@ -44,7 +44,7 @@ APART = {
 Its bodies meet colliders, rigid ones the room alone, and each other only later. Nothing reaches the mesh, nor rests so long.
 """
 
-EVERYTHING = APART | {"bodies": [
+EVERYTHING = APART | {"solver": {**APART["solver"], "orientation_guard": True}, "bodies": [
     *APART["bodies"],
     {"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 0.5, "position": [0.65, 0.1, 0.33], "velocity": [1.5, 0, -2]},
     {"kind": "box", "name": "block", "size": [0.2, 0.2, 0.2], "mass": 1, "position": [-0.5, -0.6, 0.302], "velocity": [0, 0, -1],

@@ -8,8 +8,8 @@ No reference counts (`_nrt`): kernels allocate nothing and hand out no array of 
 them, keeps all alive. Counting would take a fifth of the time of a heap, and an eighth of the time of compiling it.
 
 Numba's disk cache checks the file of the cached function only: an edited callee in another file would be served stale.
-So the cache folder is named after everything that the machine code depends on: all sources of this package, Numba,
-NumPy and the processor. An edit anywhere gives a new folder.
+So the cache folder is named after everything that the machine code depends on: the sources of kernels and of what they
+call, Numba, NumPy and the processor. An edit anywhere among them gives a new folder.
 """
 
 import hashlib
@@ -26,18 +26,20 @@ import numba
 import numpy as np
 
 config: Any = numba.config
+types: Any = numba.types
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,
                          "_nrt": False}
+COMPILED = ("_jit.py", "buffers.py", "frame.py", "physics", "kernels", "effects")       # what machine code is made from
 FOLDERS_KEPT = 4
 OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 
 
 def fingerprint(package: Path = Path(__file__).parent) -> str:
-    """Hash of everything that compiled kernels depend on: sources, Numba, NumPy and the processor."""
+    """Hash of everything that compiled kernels depend on: their sources, Numba, NumPy and the processor."""
     digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
+    for source in sorted(path for name in COMPILED for path in (package / name, *(package / name).rglob("*.py")) if path.is_file()):
         digest.update(f"{source.relative_to(package)}\0".encode())
         digest.update(source.read_bytes())
     environment = (numba.__version__, np.__version__, platform.python_version(), llvm.get_host_cpu_name(),
@@ -65,6 +67,10 @@ def _prune(root: Path, current: Path) -> None:
 CACHE = cache_root() / fingerprint()
 if not CACHE.exists():
     _prune(CACHE.parent, CACHE)
+
+
+clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.CPointer(types.int64)))
+"""POSIX: the seconds and nanoseconds of a clock, into the array whose `.ctypes` is the second argument."""
 
 
 def kernel(function: Function) -> Function:

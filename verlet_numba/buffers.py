@@ -556,6 +556,16 @@ class Restitution(NamedTuple):
     rebound: Array              # (L,) double m; displacement along the normal after the impact, 0 where there is none
 
 
+class Orientation(NamedTuple):
+    """Rigid bodies that are not to be turned inside out (effects/orientation.py)."""
+
+    first: Array                # (G,) int 1; inner index of the first particle
+    stride: Array               # (G,) int 1; from one particle to the next
+    size: Array                 # (G,) int 1; particles
+    corner: Array               # (4, G) int 1; inner indices of four particles that span a volume
+    sign: Array                 # (G,) double 1; of that volume at rest
+
+
 class Effects(NamedTuple):
     """What the scene calls for; what it does not is None and no part of the compiled frame."""
 
@@ -579,6 +589,7 @@ class Effects(NamedTuple):
     friction: Friction | None
     restitution: Restitution | None
     rest: Rest | None
+    orientation: Orientation | None
 
 
 class Solver(NamedTuple):

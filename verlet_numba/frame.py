@@ -19,6 +19,7 @@ from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, gat
 from verlet_numba.effects.mesh_contact import deepest_in_meshes
 from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
+from verlet_numba.effects.orientation import keep_orientation
 from verlet_numba.effects.recall import begin_pass, keep_colliders, keep_hulls, recall_colliders, recall_hulls
 from verlet_numba.effects.response import displace, kick_back, link, rebound, shove
 from verlet_numba.effects.rest import at_rest, depth_at_rest, find_at_colliders, hold, idle, settle, wake
@@ -66,7 +67,8 @@ def advance(world, frames, budget):
     effects, solver, observed, snapshot, clock, stopwatch = world[11:]
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
-    contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features, friction, restitution, rest = effects[6:]
+    contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features = effects[6:17]
+    friction, restitution, rest, orientation = effects[17:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -163,6 +165,7 @@ def advance(world, frames, budget):
                                                                approximate, start)
                 snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)
                 lap(stopwatch, RELAXATION)
+            keep_orientation(position, previous, orientation)
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)
             keep_hulls(meet, rigid, touches, HULLS)

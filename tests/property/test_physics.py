@@ -127,10 +127,10 @@ def test_chunks_of_any_size_give_the_same_bits(sizes):
 
 @pytest.fixture(scope="module")
 def without():
-    """Bodies that meet colliders under gravity, and nothing else: scene and positions."""
+    """Bodies that meet colliders under gravity and may rest, which changes how they meet, and nothing else: scene, positions."""
     bodies, colliders = ([{**entry, "friction": 0, "restitution": 0} for entry in bare(worlds.EVERYTHING[key])]
                          for key in ("bodies", "colliders"))
-    absent = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
+    absent = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution"))
     scene = worlds.with_changes(worlds.EVERYTHING, effects=absent, bodies=bodies, colliders=colliders, output={"fields": []})
     return scene, worlds.advanced(worlds.started(scene), 10)[0]
 
@@ -143,7 +143,7 @@ def bare(entries):
 def test_effects_set_to_nothing_change_nothing(without):
     """A far body that has friction, bounces, is carried and meets what moves calls for the effects, and nobody feels it.
 
-    Nor a far mesh, nor that bodies may rest. Not a bit changes but of rigid bodies, which friction of 0 moves by a twist of 0.
+    Nor a far mesh. Not a bit changes but of rigid bodies, which friction of 0 moves by a twist of 0.
     """
     scene, expected = without
     far = {"kind": "rope", "name": "far", "start": [0, 0, 99], "end": [1, 0, 99], "segments": 2, "mass": 1, "friction": 1,
@@ -151,8 +151,7 @@ def test_effects_set_to_nothing_change_nothing(without):
     moving = {"kind": "sphere", "radius": 1, "position": [99, 0, 0], "spin": {"axis": [0, 0, 1], "rate": 1},
               "friction": 1, "restitution": 0}
     mesh = worlds.EVERYTHING["colliders"][-1] | {"friction": 0, "restitution": 0}
-    nothing = {"drag": {"linear": 1e-30, "quadratic": 0}, "damping": 1e-30, "wind": {"velocity": [9, 9, 9], "density": 1e-30},
-               "rest": worlds.EVERYTHING["effects"]["rest"]}
+    nothing = {"drag": {"linear": 1e-30, "quadratic": 0}, "damping": 1e-30, "wind": {"velocity": [9, 9, 9], "density": 1e-30}}
     crowded = worlds.with_changes(scene, effects=nothing, bodies=[*scene["bodies"], far],
                                   colliders=[*scene["colliders"], moving, mesh], output={"fields": ["velocity"]})
     model = worlds.started(crowded)

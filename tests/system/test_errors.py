@@ -36,7 +36,7 @@ effects:
 PLACES = {"2:21": "frame_rate", "3:20": "substeps", "5:5": "mass", "6:12": "box", "7:56": "finite", "9:3": "gravity"}
 
 SAMPLES = {     # an override for everything that this version may not do yet
-    "solver.deformable_contact": "solver.deformable_contact=exact", "solver.orientation_guard": "solver.orientation_guard=true",
+    "solver.deformable_contact": "solver.deformable_contact=exact",
     "effects.continuous_collision": "effects.continuous_collision=true", "effects.bending": "effects.bending={stiffness: 0.5}",
     "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments"}
 DONE = ("preset=paper", "order=lines", "repeats=once", "response=feature", "projection_point=printed",

@@ -18,7 +18,8 @@ OCCURS = {
     "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
     "relax_graph.sort_bodies": {"graph", "collided"}, "relax_lines.solve": {"lines"}, "relax_started.part": {"start"},
-    "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"}, "stopwatch.reading": {"stopwatch"}}
+    "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"},
+    "orientation.volume": {"orientation"}, "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
@@ -35,9 +36,9 @@ CONSTRAINTS = {"paper": {"graph", "collided"}, "chains": {"lines"}, "step start"
 """Parts of the world, beside effects, that scenes have."""
 SCENES = {
     "everything": (worlds.EVERYTHING, EFFECTS - {"features"}),
-    "paper": (worlds.PAPER, EFFECTS - WHOLE),
+    "paper": (worlds.PAPER, EFFECTS - WHOLE - {"orientation"}),
     "colliders at rest": (worlds.with_changes(worlds.EVERYTHING, effects=CALM, bodies=BARE, colliders=STILL, output={"fields": []}),
-                          {"gravity", "contact", *MEET, *MIX, *WHOLE}),
+                          {"gravity", "contact", "orientation", *MEET, *MIX, *WHOLE}),
     "a crate on the floor": (worlds.FREE | {"bodies": [*worlds.FREE["bodies"][1:], *RIGID], "colliders": [{"kind": "plane"}],
                                            "effects": {"gravity": [0, 0, -9.81]}},
                              {"gravity", "contact", "trees", "points", "mixed", *WHOLE}),

@@ -13,9 +13,9 @@ from verlet_numba import _jit
 
 PACKAGE = Path(_jit.__file__).parent
 CALLEE = "from verlet_numba._jit import kernel\n\n\n@kernel\ndef double(x):\n    return {factor} * x\n"
-CALLER = ("from verlet_numba._jit import kernel\nfrom verlet_numba.callee import double\n\n\n"
+CALLER = ("from verlet_numba._jit import kernel\nfrom verlet_numba.kernels.callee import double\n\n\n"
           "@kernel\ndef twice_and_one(x):\n    return double(x) + 1.0\n")
-RUN = ("from verlet_numba.caller import twice_and_one as f\n"
+RUN = ("from verlet_numba.kernels.caller import twice_and_one as f\n"
        "print(f(3.0), sum(f.stats.cache_hits.values()), sum(f.stats.cache_misses.values()))")
 
 
@@ -23,11 +23,13 @@ RUN = ("from verlet_numba.caller import twice_and_one as f\n"
 def package(tmp_path):
     """A package of the same name: _jit.py, a kernel, and in another file the kernel that it calls."""
     folder = tmp_path / "verlet_numba"
-    folder.mkdir()
+    kernels = folder / "kernels"
+    kernels.mkdir(parents=True)
     shutil.copy(PACKAGE / "_jit.py", folder)
-    (folder / "__init__.py").touch()
-    (folder / "callee.py").write_text(CALLEE.format(factor=2.0))
-    (folder / "caller.py").write_text(CALLER)
+    for place in (folder, kernels):
+        (place / "__init__.py").touch()
+    (kernels / "callee.py").write_text(CALLEE.format(factor=2.0))
+    (kernels / "caller.py").write_text(CALLER)
     return folder
 
 
@@ -48,18 +50,21 @@ def test_an_edited_callee_is_compiled_anew_and_an_unedited_one_is_not(package):
     value, hits, misses, again = run(package)
     assert (value, hits, misses) == (7.0, 1, 0)
     assert again == files
-    (package / "callee.py").write_text(CALLEE.format(factor=5.0))
+    (package / "cli.py").touch()            # no kernel depends on it
+    assert run(package) == (7.0, 1, 0, files)
+    (package / "kernels" / "callee.py").write_text(CALLEE.format(factor=5.0))
     value, hits, misses, after = run(package)
     assert (value, hits, misses) == (16.0, 0, 1)
     assert len(after) == 2 * len(files)
 
 
-def test_the_fingerprint_knows_every_source_and_the_environment(package, monkeypatch):
+def test_the_fingerprint_knows_every_source_of_kernels_and_the_environment(package, monkeypatch):
     first = _jit.fingerprint(package)
+    (package / "cli.py").touch()
     assert _jit.fingerprint(package) == first
-    (package / "other.py").touch()
+    (package / "kernels" / "other.py").touch()
     second = _jit.fingerprint(package)
-    (package / "other.py").write_text("x = 1\n")
+    (package / "kernels" / "other.py").write_text("x = 1\n")
     third = _jit.fingerprint(package)
     monkeypatch.setattr(_jit.np, "__version__", "0.0")
     assert len({first, second, third, _jit.fingerprint(package)}) == 4
@@ -77,6 +82,13 @@ def test_old_folders_go_and_what_is_not_ours_stays(tmp_path):
     kept = {path.name for path in tmp_path.iterdir()}
     assert kept == {"mine", "x" * 21, "f" * 20} | {folder.name for folder in folders[-(_jit.FOLDERS_KEPT - 1):]}
     _jit._prune(tmp_path / "missing", tmp_path)
+
+
+def test_kernels_stand_where_the_fingerprint_looks():
+    compiled = [path for path in PACKAGE.rglob("*.py")
+                if re.search(r"_jit import .*\b(kernel|formula|inlined|scan)\b", path.read_text())]
+    assert len(compiled) > 40
+    assert {path.relative_to(PACKAGE).parts[0] for path in compiled} <= set(_jit.COMPILED)
 
 
 def test_only_one_file_names_numba():

@@ -4,17 +4,12 @@ Nobody who does not ask for it pays for it: without a stopwatch the calls are no
 one of so many substeps is timed.
 """
 
-from numba import types
-
-from verlet_numba._jit import kernel
+from verlet_numba._jit import clock_gettime, kernel
 
 PHASES = ("rest", "gravity", "wind", "drag", "damping", "integration", "paths", "finding contacts", "weighing contacts",
           "answering contacts", "relaxation", "rebound and friction", "frames")
 (REST, GRAVITY, WIND, DRAG, DAMPING, INTEGRATION, PATHS, FINDING, WEIGHING, ANSWERING, RELAXATION, REBOUND,
  FRAMES) = range(len(PHASES))
-
-clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.CPointer(types.int64)))
-
 
 @kernel
 def reading(clock, spec):

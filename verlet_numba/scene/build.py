@@ -30,6 +30,7 @@ from verlet_numba.scene.constraints import constraints
 from verlet_numba.scene.lines import lines_of, loose
 from verlet_numba.scene.meeting import contact_of
 from verlet_numba.scene.numbering import Numbering, number, padded, spread
+from verlet_numba.scene.orientation import orientation_of
 from verlet_numba.scene.schema import Scene
 
 
@@ -108,7 +109,8 @@ def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
                    forces.wind(scene.effects, bodies, numbering, inverse_mass, real),
                    forces.drag(scene.effects, inverse_mass, real),
                    forces.damping(scene.effects, inverse_mass, step),
-                   carried(bodies, numbering), *contact)
+                   carried(bodies, numbering), *contact,
+                   orientation_of(bodies, numbering) if scene.solver.orientation_guard else None)
 
 
 def state(size: int, inverse_mass: Floats, effects: Effects, real: Any) -> tuple[Particles, Snapshot]:

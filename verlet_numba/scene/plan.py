@@ -94,8 +94,11 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("motion of colliders", active.moving is not None,
                 "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
     yield from contacts(prepared, model)
-    for name in ("continuous collision", "bending", "orientation guard"):
+    for name in ("continuous collision", "bending"):
         yield Phase(name, False, "not simulated yet")
+    yield Phase("orientation guard", active.orientation is not None,
+                "not asked for by solver.orientation_guard" if not scene.solver.orientation_guard else
+                "solver.orientation_guard" if active.orientation else "no rigid body that has a volume and no pins")
     yield Phase("rest", active.rest is not None, rest_reason(prepared, active))
     yield from constraints(world)
     yield Phase("velocities", "velocity" in scene.output.fields, "named in output.fields" if scene.output.fields

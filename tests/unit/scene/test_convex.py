@@ -169,11 +169,13 @@ def test_several_contacts_are_for_flat_hulls_that_can_meet(bodies, colliders, ex
 
 
 def test_the_buffers_of_a_built_scene_are_these():
-    model = worlds.built(worlds.EVERYTHING)
+    model = worlds.built(worlds.with_changes(worlds.EVERYTHING, effects={"rest": None}))
     hulls = model.world.effects.hulls
     assert isinstance(hulls, Hulls)
     assert all(array.flags.c_contiguous for array in hulls)
     np.testing.assert_array_equal(hulls.flat, [0, 0, 0, 1, 0, 1, 0, 1, 1, 1, 1])      # dice, crate, die, block, colliders
+    resting = worlds.built(worlds.EVERYTHING).world.effects.hulls.flat
+    np.testing.assert_array_equal(resting, [1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 1])           # what shall rest, on small faces too
 
 
 def test_a_part_of_particles_within_has_fewer_corners():

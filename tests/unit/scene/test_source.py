@@ -1,5 +1,6 @@
 """YAML text to plain data and positions."""
 
+import re
 import tracemalloc
 from pathlib import Path
 
@@ -92,8 +93,11 @@ CHAIN = "k0: &k0 [[[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]]]\n" + "".join(
     f"k{n}: &k{n} [[[[[[[[[[[[[[[[[[[[*k{n - 1}]]]]]]]]]]]]]]]]]]]]\n" for n in range(1, 100))
 
 
+DEEP = "deep|nesting depth"         # the reader may have a bound of its own
+
+
 @pytest.mark.parametrize(("text", "words"), [
-    (BOMB, "expand"), (CHAIN, "deep"), ("[" * 5000, "deep"), ("[" * 5000 + "]" * 5000, "deep"), ("{a: " * 5000, "deep"),
+    (BOMB, "expand"), (CHAIN, "deep"), ("[" * 5000, DEEP), ("[" * 5000 + "]" * 5000, DEEP), ("{a: " * 5000, DEEP),
     ("- " * 5000 + "1", "deep"), ("? " * 5000, "deep"), ("\n".join(" " * n + "a:" for n in range(2000)), "deep"),
     ("[" + "*a," * 5000, "anchor"), ("\n".join(f"k{n}: 1" for n in range(20_000)), "keys"),
     ("a: 1\n" * 20_000, "second time"), ("#" * (MAX_BYTES + 1), "MB")])
@@ -104,7 +108,7 @@ def test_hostile_text_is_refused_with_little_memory(text: str, words: str) -> No
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert words in found[-1][2]
+    assert re.search(words, found[-1][2])
     assert len(found) <= 1000
     assert peak < 60e6
 
