@@ -141,10 +141,14 @@ def errors(case: Case, x: Array) -> Array:
 
 
 def with_lists(graph: Graph, lists: Lists, over: float) -> Graph:
-    """The same bodies relaxed by other lists."""
+    """The same bodies relaxed by other lists, a family for each."""
     every = [SEQUENTIAL[0], *lists]
     ends = np.cumsum([0, *map(len, every)])
-    return graph._replace(entry=np.concatenate(every), listed=np.stack([ends[:-1], ends[1:]]), weight=over * graph.weight)
+    size = len(every)
+    one = {name: np.repeat(getattr(graph, name)[..., :1], size, axis=-1)
+           for name in ("turn", "stride", "particles", "lanes", "sticks")}
+    return graph._replace(entry=np.concatenate(every), listed=np.stack([ends[:-1], ends[1:]]), weight=over * graph.weight,
+                          family=np.arange(size), start=np.zeros(size + 1, np.int64), **one)
 
 
 @njit
