@@ -225,7 +225,8 @@ def runs(case: Case, tolerance: float) -> Iterator[tuple[str, Step]]:
     for order, (cycle, over) in ORDERS.items():
         graphs = [with_lists(case.graph, lists, over) for lists in cycle]
         lengths = [sum(len(lists[v]) for v in case.moved) for lists in cycle]
-        sort_bodies(case.graph, case.moved)
+        for graph in graphs:
+            sort_bodies(graph, case.moved)
 
         def step(x: Array, k: int, graphs: list[Graph] = graphs, lengths: list[int] = lengths) -> tuple[int, int]:
             k %= len(graphs)
