@@ -73,7 +73,7 @@ def list_lengths(model: Model) -> Array:
     graph, collided = model.world.graph, model.world.collided
     if graph is None or collided is None:
         return np.full(model.bodies[0].copies, len(model.bodies[0].shape.sticks))
-    return np.diff(graph.listed, axis=0)[0][graph.bucket + collided.moved + 1]
+    return np.diff(graph.listed, axis=0)[0][graph.family[graph.bucket + collided.moved + 1]]
 
 
 def off(world: World, bodies: int) -> Array:

@@ -141,10 +141,14 @@ def errors(case: Case, x: Array) -> Array:
 
 
 def with_lists(graph: Graph, lists: Lists, over: float) -> Graph:
-    """The same bodies relaxed by other lists."""
+    """The same bodies relaxed by other lists, a family for each."""
     every = [SEQUENTIAL[0], *lists]
     ends = np.cumsum([0, *map(len, every)])
-    return graph._replace(entry=np.concatenate(every), listed=np.stack([ends[:-1], ends[1:]]), weight=over * graph.weight)
+    size = len(every)
+    one = {name: np.repeat(getattr(graph, name)[..., :1], size, axis=-1)
+           for name in ("turn", "stride", "particles", "lanes", "sticks")}
+    return graph._replace(entry=np.concatenate(every), listed=np.stack([ends[:-1], ends[1:]]), weight=over * graph.weight,
+                          family=np.arange(size), start=np.zeros(size + 1, np.int64), **one)
 
 
 @njit
@@ -221,7 +225,8 @@ def runs(case: Case, tolerance: float) -> Iterator[tuple[str, Step]]:
     for order, (cycle, over) in ORDERS.items():
         graphs = [with_lists(case.graph, lists, over) for lists in cycle]
         lengths = [sum(len(lists[v]) for v in case.moved) for lists in cycle]
-        sort_bodies(case.graph, case.moved)
+        for graph in graphs:
+            sort_bodies(graph, case.moved)
 
         def step(x: Array, k: int, graphs: list[Graph] = graphs, lengths: list[int] = lengths) -> tuple[int, int]:
             k %= len(graphs)

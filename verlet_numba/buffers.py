@@ -100,19 +100,24 @@ class Graph(NamedTuple):
     """Rigid bodies relaxed outwards from the particle that a collision moved most (paper, 6.2).
 
     A kind of bodies shares topology and weights, not rest lengths. It has a bucket for the template's own order and one
-    for every particle, each with its list of sticks; bodies of one bucket are relaxed side by side.
+    for every particle. Buckets whose lists of sticks are images of one list under symmetries of the kind make a family:
+    their bodies are relaxed side by side, each as its bucket turns it.
     """
 
     body: Array                 # (2, G) int 1; inner index of the first particle, column of `rest` of the first stick
     bucket: Array               # (G,) int 1; first bucket of the body's kind, for bodies untouched; that of particle p is p + 1 on
-    sorted: Array               # (2, G) int 1; `body`, bucket by bucket
-    start: Array                # (D + 1,) int 1; bodies of bucket d are columns start[d] to start[d + 1] of `sorted`
-    stride: Array               # (D,) int 1; from one particle of a body to the next
-    particles: Array            # (D,) int 1; of each body
-    lanes: Array                # (D,) int 1; at most so many bodies are packed side by side
-    sticks: Array               # (2, D) int 1; first of the kind's columns in `ends` and `weight`, and one past the last
-    listed: Array               # (2, D) int 1; the bucket's list is entry[listed[0, d]:listed[1, d]]
+    family: Array               # (D,) int 1; of each bucket
+    turn: Array                 # (2, D) int 1; first of the bucket's entries in `places` and in `images`
+    sorted: Array               # (4, G) int 1; `body` and the `turn` of its bucket, family by family
+    start: Array                # (F + 1,) int 1; bodies of family f are columns start[f] to start[f + 1] of `sorted`
+    stride: Array               # (F,) int 1; from one particle of a body to the next
+    particles: Array            # (F,) int 1; of each body
+    lanes: Array                # (F,) int 1; at most so many bodies are packed side by side
+    sticks: Array               # (2, F) int 1; first of the kind's columns in `ends` and `weight`, and one past the last
+    listed: Array               # (2, F) int 1; the family's list is entry[listed[0, f]:listed[1, f]]
     entry: Array                # (E,) int 1; lists of sticks of a body
+    places: Array               # (W,) int 1; of the images of a body's particles, from its first particle on
+    images: Array               # (T,) int 1; of a body's sticks
     ends: Array                 # (2, S) int 1; particles of a body that each stick joins
     weight: Array               # (2, S) real 1; w_i / (w_i + w_j); both 0: a stick between pins
     rest: Array                 # (V,) real m; of one body's sticks after the other's, once for bodies that are alike

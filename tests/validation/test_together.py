@@ -21,7 +21,7 @@ FALLING = {"kind": "rope", "name": "falling", "start": [29.9, 0, 0.8], "end": [3
 TIED = [CRATE | {"name": "held", "position": [20, 0, 0], "fixed": True},
         {"kind": "rope", "name": "thick", "start": [20.15, 0.15, -0.1], "end": [21.15, 0.15, -0.1], "segments": 20, "mass": 0.5,
          "thickness": 0.12}]
-NOTHING = {"drag": {"linear": 0, "quadratic": 0}, "damping": 0, "wind": {"velocity": [1, 0, 0], "density": 0},
+NOTHING = {"drag": {"linear": 1e-30}, "damping": 1e-30, "wind": {"velocity": [1, 0, 0], "density": 1e-30},
            "gravity": [0, 0, -9.81], "rest": {"time": 0.1}}
 
 

@@ -21,10 +21,10 @@ def choose_lists(position, collided, graph):
     x, y, z, u, v, w = position[0], position[1], position[2], collided.before[0], collided.before[1], collided.before[2]
     first, bucket, stride, particles, moved = graph.body[0], graph.bucket, graph.stride, graph.particles, collided.moved
     for b in range(first.size):
-        by, most = stride[bucket[b]], 0.0
+        f, most = graph.family[bucket[b]], 0.0
         moved[b] = -1
-        for p in range(particles[bucket[b]]):
-            k = first[b] + p * by
+        for p in range(particles[f]):
+            k = first[b] + p * stride[f]
             dx, dy, dz = x[k] - u[k], y[k] - v[k], z[k] - w[k]
             way = dx * dx + dy * dy + dz * dz
             if way > most:

@@ -1,9 +1,9 @@
 """Relaxation of rigid bodies in the order of the constraint graph (paper, 6.2), at vector speed.
 
-Bodies that are relaxed by the same list make a bucket. They are packed side by side, particle p of body k in lane k of
-row p, relaxed as one run for each entry of the list, and put back. Bodies share no particle, so the result of every
-body is bit for bit that of relaxing it alone, stick by stick. Rest lengths are laid out likewise; for bodies that are
-alike once for all of them.
+Bodies whose lists are images of one list make a family. They are packed side by side, the image of particle p of body k
+in lane k of row p, relaxed as one run for each entry of the list, and put back. Bodies share no particle, and exchanging
+the ends of a stick changes signs only, so the result of every body is bit for bit that of relaxing it alone, stick by
+stick. Rest lengths are laid out likewise; for bodies that are alike, and turned alike, once for all of them.
 
 Lanes are filled up to whole vectors with what is not a number: it is never off tolerance.
 """
@@ -19,22 +19,24 @@ VECTOR = 8
 
 @kernel
 def sort_bodies(graph, moved):
-    """Put every rigid body into its bucket. moved: (G,) particle that a collision moved most, -1: the body did not collide.
+    """Put every rigid body into its family. moved: (G,) particle that a collision moved most, -1: the body did not collide.
 
-    A counting sort: counts become ends, and bodies are put in from behind, so that those of a bucket stay in order.
+    A counting sort: counts become ends, and bodies are put in from behind, so that those of a family stay in order.
     """
     if graph is None:
         return
-    body, bucket, order, start = graph.body, graph.bucket, graph.sorted, graph.start
+    body, bucket, family, turn, order, start = graph.body, graph.bucket, graph.family, graph.turn, graph.sorted, graph.start
     start[:] = 0
     for g in range(bucket.size):
-        start[bucket[g] + moved[g] + 1] += 1
-    for d in range(1, start.size):
-        start[d] += start[d - 1]
+        start[family[bucket[g] + moved[g] + 1]] += 1
+    for f in range(1, start.size):
+        start[f] += start[f - 1]
     for g in range(bucket.size - 1, -1, -1):
         d = bucket[g] + moved[g] + 1
-        start[d] -= 1
-        order[0, start[d]], order[1, start[d]] = body[0, g], body[1, g]
+        f = family[d]
+        start[f] -= 1
+        k = start[f]
+        order[0, k], order[1, k], order[2, k], order[3, k] = body[0, g], body[1, g], turn[0, d], turn[1, d]
 
 
 @kernel
@@ -42,24 +44,26 @@ def relax_graph(position, graph, tolerance, approximate):
     """Relax every rigid body once by its list. Returns the number of constraints relaxed: all, or those off tolerance."""
     if graph is None:
         return 0
-    _, _, order, start, stride, particles, lanes, sticks, listed, entry, ends, weight, rest, packed, lengths = graph
-    relaxed, laid_out = 0, (-1, 0)
-    for d in range(particles.size):
-        kind = slice(sticks[0, d], sticks[1, d])
-        joins, shares, entries = ends[:, kind], weight[:, kind], entry[listed[0, d]:listed[1, d]]
-        for begin in range(start[d], start[d + 1], lanes[d]):
-            place, own = order[:, begin:min(begin + lanes[d], start[d + 1])]
-            width = -(-place.size // VECTOR) * VECTOR
-            pack(position, place, stride[d], particles[d], width, packed)
-            wanted = (common(own), width)
-            if wanted != laid_out or wanted[0] < 0:
-                lay_out(rest, own, shares.shape[1], width, lengths)
+    order, start, particles, lanes, sticks = graph.sorted, graph.start, graph.particles, graph.lanes, graph.sticks
+    packed, lengths, relaxed, laid_out = graph.packed, graph.lengths, 0, (-1, -1, 0)
+    for f in range(particles.size):
+        kind = slice(sticks[0, f], sticks[1, f])
+        joins, shares = graph.ends[:, kind], graph.weight[:, kind]
+        entries = graph.entry[graph.listed[0, f]:graph.listed[1, f]]
+        for begin in range(start[f], start[f + 1], lanes[f]):
+            bodies = order[:, begin:min(begin + lanes[f], start[f + 1])]
+            count = bodies.shape[1]
+            width = -(-count // VECTOR) * VECTOR
+            pack(position, bodies, graph.places, particles[f], width, packed)
+            wanted = (common(bodies[1]), common(bodies[3]), width)
+            if wanted != laid_out or min(wanted) < 0:
+                lay_out(graph.rest, bodies, graph.images, shares.shape[1], width, lengths)
                 laid_out = wanted
             if tolerance is None:
-                relaxed += place.size * relax_list(packed, lengths, width, entries, joins, shares, approximate)
+                relaxed += count * relax_list(packed, lengths, width, entries, joins, shares, approximate)
             else:
                 relaxed += relax_tolerant_list(packed, lengths, width, entries, joins, shares, tolerance, approximate)
-            unpack(position, place, stride[d], particles[d], width, packed)
+            unpack(position, bodies, graph.places, particles[f], width, packed)
     return relaxed
 
 
@@ -73,34 +77,41 @@ def common(own):
 
 
 @kernel
-def lay_out(rest, own, sticks, width, lengths):
-    """Rest lengths of bodies, whose first stand at own (N,), into lanes; lanes without a body take the first body's."""
+def lay_out(rest, bodies, images, sticks, width, lengths):
+    """Rest lengths of bodies, columns of Graph.sorted, into lanes; lanes without a body take the first body's."""
+    own, turn, count = bodies[1], bodies[3], bodies.shape[1]
     for c in range(sticks):
         row = lengths[c * width:(c + 1) * width]
-        for k in range(own.size):
-            row[k] = rest[own[k] + c]
-        row[own.size:] = row[0]
+        for k in range(count):
+            row[k] = rest[np.uint64(own[k] + images[np.uint64(turn[k] + c)])]
+        row[count:] = row[0]
 
 
 @kernel
-def pack(position, place, stride, particles, width, packed):
-    """Particles of the bodies that begin at place (N,) into lanes; lanes without a body are not a number."""
-    for axis in range(3):
-        for p in range(particles):
-            column, row = position[axis, p * stride:], packed[axis, p * width:(p + 1) * width]
-            for k in range(place.size):
-                row[k] = column[np.uint64(place[k])]
-            row[place.size:] = np.nan
+def pack(position, bodies, places, particles, width, packed):
+    """Particles of the bodies, columns of Graph.sorted, into lanes; lanes without a body are not a number."""
+    first, turn, count = bodies[0], bodies[2], bodies.shape[1]
+    x, y, z, u, v, w = position[0], position[1], position[2], packed[0], packed[1], packed[2]
+    for p in range(particles):
+        row = slice(p * width, p * width + count)
+        a, b, c = u[row], v[row], w[row]
+        for k in range(count):
+            place = np.uint64(first[k] + places[np.uint64(turn[k] + p)])
+            a[k], b[k], c[k] = x[place], y[place], z[place]
+        packed[:, p * width + count:(p + 1) * width] = np.nan
 
 
 @kernel
-def unpack(position, place, stride, particles, width, packed):
+def unpack(position, bodies, places, particles, width, packed):
     """And back."""
-    for axis in range(3):
-        for p in range(particles):
-            column, row = position[axis, p * stride:], packed[axis, p * width:(p + 1) * width]
-            for k in range(place.size):
-                column[np.uint64(place[k])] = row[k]
+    first, turn, count = bodies[0], bodies[2], bodies.shape[1]
+    x, y, z, u, v, w = position[0], position[1], position[2], packed[0], packed[1], packed[2]
+    for p in range(particles):
+        row = slice(p * width, p * width + count)
+        a, b, c = u[row], v[row], w[row]
+        for k in range(count):
+            place = np.uint64(first[k] + places[np.uint64(turn[k] + p)])
+            x[place], y[place], z[place] = a[k], b[k], c[k]
 
 
 @kernel

@@ -16,6 +16,7 @@ from verlet_numba.buffers import Graph, gate
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.constraints import plain, weights
 from verlet_numba.scene.numbering import Numbering, padded
+from verlet_numba.scene.symmetry import Turn, turns
 
 REPEATS: dict[str, Callable[[int, int], int]] = {
     "by_level": lambda n, k: -(-n // k), "halving": lambda n, k: -(-n // 2 ** (k - 1)), "once": lambda n, k: 1}
@@ -56,9 +57,29 @@ def constraint_list(sticks: Integers, particle: int, repeats: str) -> Integers:
     return np.array([c for k, level in enumerate(found, 1) for c in level * REPEATS[repeats](len(found), k)], np.int64)
 
 
-def lists(shape: Shape, repeats: str) -> list[Integers]:
+class Buckets(NamedTuple):
+    """Of a kind: bucket 0 for the template's own order, bucket v + 1 for C_v. Those of a family are relaxed side by side."""
+
+    entries: list[Integers]     # of each family: numbers of sticks
+    family: Integers            # (P + 1,) of each bucket
+    turns: list[Turn]           # of each bucket: its list is the family's under the turn
+
+
+def buckets_of(sticks: Integers, weight: Floats, count: int, repeats: str) -> Buckets:
+    """The buckets of bodies of `count` particles with sticks (C, 2) of weights (2, C).
+
+    Particles that a symmetry takes to each other see the same levels, so C_v may be the image of another particle's list.
+    """
+    own, found = np.arange(len(sticks)), turns(sticks, weight, count)
+    bases, family = np.unique([turn.base for turn in found], return_inverse=True)
+    return Buckets([own, *(constraint_list(sticks, v, repeats) for v in bases.tolist())], np.array([0, *family + 1]),
+                   [Turn(0, np.arange(count), own), *found])
+
+
+def lists(shape: Shape, weight: Floats, repeats: str) -> list[Integers]:
     """What a body's buckets are relaxed by: the template's own order, then C_v of every particle."""
-    return [np.arange(len(shape.sticks)), *(constraint_list(shape.sticks, v, repeats) for v in range(len(shape.positions)))]
+    entries, family, found = buckets_of(shape.sticks, weight, len(shape.positions), repeats)
+    return [turn.sticks[entries[f]] for f, turn in zip(family, found, strict=True)]
 
 
 def lanes_of(shape: Shape, itemsize: int) -> int:
@@ -109,24 +130,28 @@ def graph_of(bodies: list[Body], numbering: Numbering, inverse_mass: Floats, rep
 
 def assembled(kinds: list[Kind], body: Integers, kind: Integers, rest: Floats, repeats: str, real: np.dtype[Any]) -> Graph:
     """Buffers of bodies (2, G), as in Graph, of these kinds (G,), all in the buckets of their template's order."""
-    ordered = {each.shape.sticks.tobytes(): each.shape for each in kinds}
-    listed: dict[bytes, Integers] = {}
-    entries: list[Integers] = []
-    for topology, shape in ordered.items():
-        found = lists(shape, repeats)
-        ends = sum(map(len, entries)) + np.cumsum([0, *map(len, found)])
-        listed[topology] = np.stack([ends[:-1], ends[1:]])
-        entries += found
-    sticks = np.cumsum([0, *(len(each.shape.sticks) for each in kinds)])
+    known: dict[tuple[bytes, bytes], Buckets] = {}
+    made = []
+    for each in kinds:
+        key, count = (each.shape.sticks.tobytes(), each.weight.tobytes()), len(each.shape.positions)
+        if key not in known:
+            known[key] = buckets_of(each.shape.sticks, each.weight, count, repeats)
+        made.append(known[key])
+    entries, families = [entry for each in made for entry in each.entries], [len(each.entries) for each in made]
+    ends, sticks = (np.cumsum([0, *map(len, each)]) for each in (entries, [each.shape.sticks for each in kinds]))
     size = np.array([len(each.shape.positions) for each in kinds])
     lanes = np.array([lanes_of(each.shape, real.itemsize) for each in kinds])
-    buckets = size + 1
-    bucket = (np.cumsum(buckets) - buckets)[kind]
-    start = np.cumsum([0, *np.bincount(bucket, minlength=buckets.sum())])
-    per_bucket = [np.repeat(values, buckets, axis=-1) for values in
+    bucket = (np.cumsum(size + 1) - size - 1)[kind]
+    family = np.concatenate([each.family for each in made]) + np.repeat(np.cumsum(families) - families, size + 1)
+    places, images = ([turn.particles * each.stride for each, own in zip(kinds, made, strict=True) for turn in own.turns],
+                      [turn.sticks for own in made for turn in own.turns])
+    turn = np.stack([np.cumsum([0, *map(len, rows)])[:-1] for rows in (places, images)])
+    order = np.argsort(family[bucket], kind="stable")
+    start = np.cumsum([0, *np.bincount(family[bucket], minlength=sum(families))])
+    per_family = [np.repeat(values, families, axis=-1) for values in
                   (np.array([each.stride for each in kinds]), size, lanes, np.stack([sticks[:-1], sticks[1:]]))]
-    whole_numbers = [body, bucket, body[:, np.argsort(bucket, kind="stable")], start, *per_bucket,
-                     np.concatenate([listed[each.shape.sticks.tobytes()] for each in kinds], axis=1), np.concatenate(entries),
+    whole_numbers = [body, bucket, family, turn, np.concatenate([body, turn[:, bucket]])[:, order], start, *per_family,
+                     np.stack([ends[:-1], ends[1:]]), np.concatenate(entries), np.concatenate(places), np.concatenate(images),
                      np.concatenate([each.shape.sticks.T for each in kinds], axis=1)]
     room = np.zeros((3, padded(int((size * lanes).max()), real.itemsize)))
     reals = [np.concatenate([each.weight for each in kinds], axis=1), rest, room, np.zeros(int((np.diff(sticks) * lanes).max()))]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from verlet_numba.scene import shapes
 from verlet_numba.scene.body import Body
-from verlet_numba.scene.constraint_graph import REPEATS, constraint_list, graph_of, levels
+from verlet_numba.scene.constraint_graph import REPEATS, buckets_of, constraint_list, graph_of, levels, lists
 from verlet_numba.scene.constraints import constraints
 from verlet_numba.scene.numbering import number
 
@@ -85,6 +85,36 @@ def test_every_stick_stands_at_its_distance(sticks, data):
         assert all(a <= b for a, b in pairwise(far[order]))
 
 
+@given(sticks=connected(), pins=st.sets(st.integers(0, 13)), repeats=st.sampled_from(sorted(REPEATS)))
+@settings(deadline=None)
+def test_lists_of_a_family_are_images_of_one(sticks, pins, repeats):
+    """C_v has the levels of v in any order within a level, and the turn takes sticks and weights to such."""
+    free = 1.0 - np.isin(sticks.T, list(pins))
+    weight = free / np.maximum(free.sum(0), 1)
+    count = int(sticks.max()) + 1
+    entries, family, turns = buckets_of(sticks, weight, count, repeats)
+    for v, (f, turn) in enumerate(zip(family[1:], turns[1:], strict=True)):
+        assert turn.particles[turn.base] == v
+        assert sorted(turn.particles) == list(range(count))
+        for c, image in enumerate(turn.sticks):
+            expected = dict(zip(turn.particles[sticks[c]], weight[:, c], strict=True))
+            assert dict(zip(sticks[image], weight[:, image], strict=True)) == expected
+        plain, far = constraint_list(sticks, v, repeats), distances(sticks, v)[sticks].min(1)
+        taken = turn.sticks[entries[f]]
+        np.testing.assert_array_equal(far[taken], far[plain])
+        np.testing.assert_array_equal(np.bincount(taken), np.bincount(plain))
+
+
+def test_symmetry_is_found_where_it_is_and_nowhere_else():
+    ring = np.array([[k, (k + 1) % 7] for k in range(7)])
+    same = np.full((2, 7), 0.5)
+    assert len(buckets_of(ring, same, 7, "once").entries) == 1 + 1
+    pinned = np.where(ring.T == 3, 0.0, np.where((ring.T == 3).any(0), 1.0, 0.5))
+    assert len(buckets_of(ring, pinned, 7, "once").entries) == 1 + 4
+    long = np.array([[k, (k + 1) % 100] for k in range(100)])
+    assert len(buckets_of(long, np.full((2, 100), 0.5), 100, "once").entries) == 1 + 100
+
+
 def bodies_of(*entries):
     """Bodies (shape, copies, pinned particles), all at the origin."""
     made = []
@@ -113,16 +143,21 @@ def test_buffers_of_several_kinds():
     np.testing.assert_array_equal(graph.body[0], np.concatenate([index[:, 0] for index in rigid]))
     np.testing.assert_array_equal(graph.body[1], [0, 0, 0, 36, 36, 72, 0, 0])
     np.testing.assert_array_equal(graph.bucket, [0, 0, 0, 13, 13, 26, 0, 0])
-    np.testing.assert_array_equal(graph.particles, [12] * 26 + [8] * 9)
+    np.testing.assert_array_equal(graph.family[:13], [0] + [1] * 12)
+    sizes = graph.particles[graph.family]
+    np.testing.assert_array_equal(sizes, [12] * 26 + [8] * 9)
     assert graph.start[-1] == 8
-    np.testing.assert_array_equal(graph.sorted[:, :5], graph.body[:, [0, 1, 2, 6, 7]])
+    np.testing.assert_array_equal(graph.sorted[:2, :5], graph.body[:, [0, 1, 2, 6, 7]])
     assert graph.rest.dtype == graph.weight.dtype == graph.packed.dtype == graph.lengths.dtype == np.float32
     assert graph.packed.shape[1] >= (graph.particles * graph.lanes).max()
     assert graph.lengths.size >= ((graph.sticks[1] - graph.sticks[0]) * graph.lanes).max()
     for bucket, body, shape, moved in ((0, 0, small, -1), (13 + 1 + 5, 3, large, 5), (26 + 1 + 7, 5, box, 7)):
-        ordered = np.arange(len(shape.sticks)) if moved < 0 else constraint_list(shape.sticks, moved, "by_level")
-        np.testing.assert_array_equal(graph.entry[slice(*graph.listed[:, bucket])], ordered)
-        np.testing.assert_array_equal(graph.ends[:, slice(*graph.sticks[:, bucket])], shape.sticks.T)
+        family = graph.family[bucket]
+        weight = graph.weight[:, slice(*graph.sticks[:, family])]
+        image = graph.images[graph.turn[1, bucket]:][:len(shape.sticks)]
+        ordered = image[graph.entry[slice(*graph.listed[:, family])]]
+        np.testing.assert_array_equal(ordered, lists(shape, weight, "by_level")[moved + 1])
+        np.testing.assert_array_equal(graph.ends[:, slice(*graph.sticks[:, family])], shape.sticks.T)
         rest = graph.rest[graph.body[1, body]:][:len(shape.sticks)]
         np.testing.assert_array_equal(rest, shape.lengths.astype(np.float32))
     pinned = (graph.ends[:, 36:72] == 5).astype(float)
