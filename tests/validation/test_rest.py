@@ -125,18 +125,21 @@ def heap(count, rest=None, seed=1):
 
 
 def test_a_heap_stands_still_by_its_contacts_alone():
-    """More touches than are solved to the end in a substep; it is not put to rest. In one throw of six a die still rolls over."""
-    drifts = []
+    """More touches than are solved to the end in a substep; only what does not move at all is put to rest.
+
+    In one throw of six a die still rolls over.
+    """
+    drifts, touches = [], []
     for seed in range(1, 7):
         model = heap(50, NEVER, seed)
         worlds.advanced(model, 8 * 60)
         position, _, measures = worlds.advanced(model, 2 * 60)
-        assert model.world.effects.touches.until[-1] > FEW_TOUCHES
-        assert (measures[:, RESTING] == 0).all()
+        touches.append(model.world.effects.touches.until[-1])
         assert measures[:, PENETRATION].max() < 1e-4
         drifts.append(np.linalg.norm(position[-1] - position[0], axis=1).reshape(50, 12).max(axis=1))
     assert (np.quantile(drifts, 0.8, axis=1) < 1e-3).all()
     assert (np.max(drifts, axis=1) < 1e-3).sum() >= 5
+    assert np.median(touches) > FEW_TOUCHES
 
 
 @pytest.mark.parametrize(("count", "seed"), [
