@@ -26,7 +26,7 @@ from verlet_numba.run import engine
 from verlet_numba.run.engine import State, start, warm
 from verlet_numba.scene.build import Model, build, frames
 
-STUDY = "absent effects"
+STUDY = "absent"
 CALLS = {"wind": {"blow"}, "drag": {"resist"}, "damping": {"damp"}, "carried": {"carry"}, "moving": {"move", "move_hulls"},
          "restitution": {"foresee", "bounce"}, "friction": {"rub", "rub_features", "rub_spheres"},
          "features": {"begin_features", "part_features"}, "spheres": {"begin_spheres", "part_spheres", "strike_spheres"},
