@@ -9,9 +9,9 @@ not say what it counts, nor when a step is done. So every reading is drawn besid
   all bodies in the first pass, then of those that still have a stick off.
 
 Writes figure_9c.csv and figure_9c.png. What holds (throws of 3 s by 1 to 50 icosahedra):
-- no reading has constraint-graph order relax half as much. With the paper's repeats it relaxes 0.99 to 1.1 times what
-  sequential order does, and visits 1.6 to 2.0 times as many constraints; each stick once in order of distance, 0.93 to 0.94
-  times, and as many visits;
+- no reading has constraint-graph order relax half as much. With the paper's repeats it relaxes 0.96 to 1.09 times what
+  sequential order does, and visits 1.5 to 2.0 times as many constraints; each stick once in order of distance, 0.93 to 0.95
+  times, and 0.9 to 1 times as many visits;
 - relaxations are a tenth of the paper's 750 a body and step: 45 to 105. Visits come near it. Those of ten passes are, for 25
   and 50 icosahedra, 9,000 and 18,000 in sequential order and 17,700 and 35,300 in graph order: near to the paper's two
   curves (9,500 and 22,500; 19,000 and 37,500), with the orders the other way round.
