@@ -273,7 +273,10 @@ def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
     from verlet_numba.scene.installed import installed
     from verlet_numba.study.verify import prepare_all, run_case, scenes_in
 
-    scenes = prepare_all(scenes_in(places or installed()))
+    files = scenes_in(places or installed())
+    if not files:
+        raise Misuse(f"there is no scene in {', '.join(map(str, places))}")
+    scenes = prepare_all(files)
     for scene in scenes:
         if not scene.scene.expect and Path(scene.loaded.source.name) in places:
             raise Misuse(f"{scene.loaded.source.name} states nothing under `expect`")

@@ -41,6 +41,6 @@ def test_json_stands_alone_and_an_error_out_of_reach_is_told(verlet, scene, tmp_
 
 @pytest.mark.parametrize(("words", "message"), [
     (["--axis", "solver.substeps"], "write PATH=VALUE"), (["--axis", "solver.substeps=1,2,3", "--runs", "2"], "more than 2"),
-    (["--set", "solver.substeps=0"], "solver.substeps")])
+    (["--set", "solver.substeps=0"], "solver.substeps"), (["--axis", "solver.substep=1,2"], "did you mean 'substeps'")])
 def test_wrong_words_are_refused(verlet, scene, tmp_path, words, message):
     assert message in verlet("accuracy", scene, *words, "-o", tmp_path / "out", code=2).stderr

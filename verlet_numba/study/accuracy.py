@@ -17,7 +17,7 @@ from verlet_numba.scene.load import Loaded
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.study import axes
 from verlet_numba.study.convergence import TWINS, Reference, distance, extent, horizon, richardson
-from verlet_numba.study.trial import Outcome, Trial
+from verlet_numba.study.trial import Outcome, Trial, under
 
 REPEATS, MOST_REPEATS = 3, 15
 LONG = 0.3                  # s: as many repeats as make this long in all
@@ -122,6 +122,7 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
     own, trial = Point({}), Trial(loaded, {}, sets)
     scene = trial.scene
     settings = axes.grid(chosen, most) if chosen else axes.star(scene, most)
+    some_allowed(loaded, sets, settings)
     say(f"the scene's own settings: {scene.solver.substeps} substeps x {scene.solver.iterations}")
     measure(own, trial, budget, 0, 0.0)
     if not own.sound:
@@ -142,6 +143,20 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
     repeat(found, trials, budget)
     mark_front(found.points)
     return found
+
+
+def some_allowed(loaded: Loaded, sets: Sequence[str], settings: list[dict[str, Any]]) -> None:
+    """Raises SceneError, that of the last setting, if none of them is allowed: nothing would be left to compare."""
+    refused = None
+    for each in settings:
+        try:
+            under(loaded, each, sets)
+        except SceneError as error:
+            refused = error
+        else:
+            return
+    if refused is not None:
+        raise refused
 
 
 def measure(point: Point, trial: Trial, budget: Budget, seed: int, shift: float) -> None:

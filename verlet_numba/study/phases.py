@@ -37,7 +37,18 @@ def phase_seconds(model: Model, count: int, seconds: float) -> tuple[dict[str, f
     whole = time.thread_time() - begin
     scale = 1e-9 * substeps / max(1, int(watch.sampled[0]))
     spent = np.maximum(0.0, watch.spent - nanoseconds_a_lap(clock) * watch.laps) * scale
+    spent[[PHASES.index(name) for name in absent(model)]] = 0.0
     return {name: float(seconds) for name, seconds in zip(PHASES, spent, strict=True) if seconds > NOTHING * spent.sum()}, whole
+
+
+def absent(model: Model) -> set[str]:
+    """Phases that the model's world has no part for: what a clock tells of them is its own noise."""
+    effects = model.world.effects
+    meets = any(each is not None for each in (effects.contact, effects.meet, effects.spheres, effects.mixed))
+    there = {"rest": effects.rest, "gravity": effects.gravity, "wind": effects.wind, "drag": effects.drag,
+             "damping": effects.damping, "paths": effects.carried or effects.moving}
+    contacts = {"finding contacts", "weighing contacts", "answering contacts", "rebound and friction"}
+    return {name for name, part in there.items() if part is None} | (set() if meets else contacts)
 
 
 def stopwatch(clock: int, every: int) -> Stopwatch:

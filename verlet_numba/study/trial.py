@@ -39,6 +39,15 @@ class Outcome:
     final: dict[str, float]                 # the contract's measures in the last frame, of vectors their length
 
 
+def under(loaded: Loaded, settings: Settings, sets: Sequence[str]) -> Loaded:
+    """The scene under these settings. Raises SceneError for what the scene or the program does not allow."""
+    overrides = [f"{path}={json.dumps(value)}" for path, value in {**settings, **IN_FULL}.items()]
+    found = loads(loaded.source.text, loaded.source.name, [*sets, *overrides])
+    if problems := unsupported(found):
+        raise SceneError(problems)
+    return found
+
+
 class Trial:
     """A scene with overrides, compiled; it can be run again and again."""
 
@@ -48,10 +57,7 @@ class Trial:
         Raises SceneError for settings that the scene or the program does not allow.
         """
         self.settings = dict(settings)
-        overrides = [f"{path}={json.dumps(value)}" for path, value in {**self.settings, **IN_FULL}.items()]
-        self.loaded = loads(loaded.source.text, loaded.source.name, [*sets, *overrides])
-        if problems := unsupported(self.loaded):
-            raise SceneError(problems)
+        self.loaded = under(loaded, settings, sets)
         self.scene = self.loaded.scene
         self.bodies = place(self.scene, self.loaded.folder, self.loaded.source)
         model, clock = self._started(), time.perf_counter()
