@@ -129,7 +129,7 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
         raise ArithmeticError("the scene diverges under its own settings: nothing to compare with")
     base = own.outcomes[0]
     twin = budget.run(trial, TWINS * extent(base), 1)
-    far = horizon(base, twin)
+    far = horizon(base, twin) if twin.sound else 0.0
     until = min(scene.time.duration, 0.5 * far)
     found = Study(scene.name, scene.time.duration, own, [], far, until, None, scene.reference, {}, {})
     if found.closed_form is None:
@@ -171,10 +171,12 @@ def converged(loaded: Loaded, sets: Sequence[str], finest: int, seconds_a_subste
               say: Callable[[str], object]) -> Reference:
     """The reference: as many substeps as its share of the budget pays for, and its half and quarter."""
     affordable = REFERENCE_SHARE * budget.left() / max(seconds_a_substep, 1e-9) / 1.75
-    substeps = int(max(finest, min(FINER * finest, affordable))) // 4 * 4 or 4
+    substeps = -(-int(max(finest, min(FINER * finest, affordable))) // 4) * 4
     say(f"the reference: {substeps} substeps, and half and a quarter of them")
     settings = ({**REFERENCE, "solver.substeps": substeps // part} for part in (4, 2, 1))
     coarse, middle, fine = (budget.run(Trial(loaded, each, sets)) for each in settings)
+    if not (coarse.sound and middle.sound and fine.sound):
+        raise ArithmeticError(f"a reference of {substeps} substeps, or its half or quarter, diverges: there is nothing to compare with")
     return richardson(coarse, middle, fine, substeps, until)
 
 
