@@ -176,7 +176,7 @@ def converged(loaded: Loaded, sets: Sequence[str], finest: int, seconds_a_subste
     settings = ({**REFERENCE, "solver.substeps": substeps // part} for part in (4, 2, 1))
     coarse, middle, fine = (budget.run(Trial(loaded, each, sets)) for each in settings)
     if not (coarse.sound and middle.sound and fine.sound):
-        raise ArithmeticError(f"a reference of {substeps} substeps, or its half or quarter, diverges: there is nothing to compare with")
+        raise ArithmeticError(f"a reference of {substeps} substeps, or its half or quarter, diverges: nothing to compare with")
     return richardson(coarse, middle, fine, substeps, until)
 
 
