@@ -51,7 +51,7 @@ def without(effects: set[str]) -> Callable[..., int]:
     tree = Delete().visit(ast.parse(inspect.getsource(frame)))
     space: dict[str, Any] = {"__name__": "frame_without"}       # its kernel is never compiled, so never kept on disk
     exec(compile(ast.fix_missing_locations(tree), frame.__file__, "exec"), space)
-    return numba.njit(**_jit.FLAGS)(space["advance"].py_func)  # type: ignore[no-any-return]
+    return numba.njit(**_jit.FLAGS)(space["advance"].py_func)  # type: ignore[no-any-return]  # Numba has no types
 
 
 def timed(model: Model, advance: Callable[..., int], count: int, before: State) -> float:
