@@ -36,16 +36,20 @@ FOLDERS_KEPT = 4
 OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 
 
-def fingerprint(package: Path = Path(__file__).parent) -> str:
-    """Hash of everything that compiled kernels depend on: their sources, Numba, NumPy and the processor."""
+def sources(package: Path = Path(__file__).parent) -> str:
+    """Hash of all source that machine code is made from."""
     digest = hashlib.sha256()
     for source in sorted(path for name in COMPILED for path in (package / name, *(package / name).rglob("*.py")) if path.is_file()):
         digest.update(f"{source.relative_to(package)}\0".encode())
         digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def fingerprint(package: Path = Path(__file__).parent) -> str:
+    """Hash of everything that compiled kernels depend on: their sources, Numba, NumPy and the processor."""
     environment = (numba.__version__, np.__version__, platform.python_version(), llvm.get_host_cpu_name(),
                    llvm.get_host_cpu_features().flatten(), os.environ.get("NUMBA_CPU_NAME", ""))
-    digest.update(repr(environment).encode())
-    return digest.hexdigest()[:20]
+    return hashlib.sha256(repr((sources(package), environment)).encode()).hexdigest()[:20]
 
 
 def cache_root() -> Path:

@@ -3,7 +3,9 @@
 import json as json_module
 import re
 import shlex
+import signal
 import sys
+import time
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,7 +15,7 @@ import click
 
 from verlet_numba import __version__
 
-FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
+FAILED, WRONG, DIVERGED, OUT_OF_TIME, INTERRUPTED, TERMINATED = 1, 2, 3, 5, 130, 143
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
@@ -52,38 +54,59 @@ def cli(debug: bool) -> None:
 @click.option("--frames", "count", type=click.IntRange(0), help="Frames after frame 0, instead of the scene's duration.")
 @click.option("--threads", type=click.IntRange(1), default=2, show_default=True,
               help="Most threads to use: with 2, frames are written while the next are simulated.")
+@click.option("--resume", is_flag=True, help="Go on with a trajectory that was begun; start if there is none.")
+@click.option("--max-time", type=click.FloatRange(0, min_open=True), metavar="S",
+              help="Stop after S seconds of wall time, for --resume to go on; exit code 5.")
 @OVERWRITE
 @AS_JSON
 @QUIET
 @VERBOSE
-def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | None, threads: int, overwrite: bool,
-        as_json: bool, quiet: bool, verbose: bool) -> None:
+def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | None, threads: int, resume: bool,
+        max_time: float | None, overwrite: bool, as_json: bool, quiet: bool, verbose: bool) -> None:
     """Simulate SCENE and write its trajectory."""
+    clock = time.perf_counter()
+    if resume and overwrite:
+        raise Misuse("--resume goes on with a file and --overwrite replaces it; give one of them")
     from verlet_numba.scene.prepare import prepare
 
     prepared = prepare(scene, sets)
     output = output or Path(default_name(prepared.scene, scene))
-    refuse_existing(output, overwrite)
+    refuse_existing(output, overwrite or resume)
     warn(prepared.warnings, quiet)
 
+    from verlet_numba.run.resume import ResumeError
     from verlet_numba.run.simulate import simulate
 
     if verbose:
         say(f"{scene}: {len(prepared.bodies)} bodies, writing {output}")
     command = shlex.join(["verlet-numba", *sys.argv[1:]])
-    summary = simulate(prepared, output, count=count, command=command, overwrite=overwrite, threads=threads,
-                       quiet=quiet)
+    left = None if max_time is None else max_time - (time.perf_counter() - clock)
+    try:
+        summary = simulate(prepared, output, count=count, command=command, overwrite=overwrite, resume=resume, threads=threads,
+                           max_time=left, quiet=quiet)
+    except ResumeError as error:
+        raise Misuse(str(error)) from error
     if as_json:
         print_json(summary.as_dict())
     elif not quiet:
         click.echo(describe(summary))
-    if summary.divergence is not None:
-        kept = f"{summary.frames} good frames are kept in {output}" if summary.frames else "No frame was good: no file was written"
-        say(f"{scene}: {summary.divergence}. {kept}")
+    finish(summary, scene)
+
+
+def finish(summary: Any, scene: Path) -> None:
+    """Tell why a run has not come to its end, and leave with the exit code that says so."""
+    kept = f"{summary.frames} frames are kept in {summary.output}"
+    if summary.status == "diverged":
+        again = f"diverged in an earlier run of {summary.output}; change the scene, then --overwrite"
+        say(f"{scene}: {summary.divergence or again}. " + (f"{summary.frames} good frames are kept in {summary.output}"
+                                                           if summary.frames else "No frame was good: no file was written"))
         raise SystemExit(DIVERGED)
-    if summary.signal is not None:
-        say(f"{scene}: stopped by a signal; {summary.frames} frames are kept in {output}")
-        raise SystemExit(128 + summary.signal)
+    if summary.status == "stopped":
+        cause = "by a signal" if summary.signal else "by --max-time"
+        say(f"{scene}: stopped {cause}" + (f"; {kept}, and --resume goes on" if summary.frames else " before the first frame"))
+        raise SystemExit(128 + summary.signal if summary.signal else OUT_OF_TIME)
+    if summary.resumed_at == summary.frames:
+        say(f"{scene}: {summary.output} is complete already")
 
 
 @cli.command()
@@ -270,6 +293,7 @@ def compare(a: Path, b: Path, tolerance: float) -> None:
 @QUIET
 def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
     """Run scenes that state what they `expect` (default: the installed ones) and hold them to it; exit 1 if one fails."""
+    from verlet_numba.run.signals import StopSignals
     from verlet_numba.scene.installed import installed
     from verlet_numba.study.verify import prepare_all, run_case, scenes_in
 
@@ -280,19 +304,22 @@ def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
     for scene in scenes:
         if not scene.scene.expect and Path(scene.loaded.source.name) in places:
             raise Misuse(f"{scene.loaded.source.name} states nothing under `expect`")
-    cases = []
-    for scene in scenes:
-        if scene.scene.expect:
-            cases.append(run_case(scene, quiet=quiet or as_json))
+    stating, stopped = [scene for scene in scenes if scene.scene.expect], None
+    cases: list[Any] = []
+    with StopSignals() as signals:
+        while len(cases) < len(stating) and not stopped:
+            cases.append(run_case(stating[len(cases)], quiet=quiet or as_json))
             if not as_json:
                 click.echo("\n".join(cases[-1].lines()))
-            if cases[-1].signal is not None:
-                raise SystemExit(128 + cases[-1].signal)
+            stopped = cases[-1].signal or signals.number
     failed = [case.scene for case in cases if not case.held]
     if as_json:
-        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed)})
+        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed), "not_run": len(stating) - len(cases)})
     else:
         click.echo(f"{len(cases)} cases, {len(cases) - len(failed)} held" + (f", failed: {', '.join(failed)}" if failed else ""))
+    if stopped:
+        say(f"stopped by a signal; {len(stating) - len(cases)} scenes were not run")
+        raise SystemExit(128 + stopped)
     if failed:
         raise SystemExit(FAILED)
 
@@ -388,6 +415,7 @@ def main() -> None:
     from verlet_numba.scene.problems import SceneError
 
     arguments = [word for word in sys.argv[1:] if word != "--debug"]
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))       # else Python would run no `finally`
     try:
         cli.main(arguments, prog_name="verlet-numba", standalone_mode=False)
     except SceneError as error:

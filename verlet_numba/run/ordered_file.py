@@ -75,6 +75,10 @@ class OrderedFile:
                 self._write_through(address, memoryview(self.held.pop(address)))
             self.committed = self.length
 
+    def sync(self) -> None:
+        """Wait until the disk has what is committed. Raises OSError."""
+        os.fsync(self.descriptor)
+
     def check(self) -> None:
         """Raise the first failed write's OSError, with the file's name."""
         if self.failure is not None:

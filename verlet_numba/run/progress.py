@@ -16,6 +16,7 @@ class Progress:
         self.stream = stream or sys.stderr
         self.bar = not quiet and self.stream.isatty()
         self.started = self.shown = time.perf_counter()
+        self.first = 0
         self.compiling: threading.Timer | None = None
 
     def __enter__(self) -> Self:
@@ -34,15 +35,20 @@ class Progress:
             self.compiling.daemon = True
             self.compiling.start()
 
-    def compiled(self) -> None:
-        """Machine code is there: time runs from here."""
+    def tell(self, text: str) -> None:
+        """A line of its own."""
+        if not self.quiet:
+            self.stream.write(f"{text}\n")
+            self.stream.flush()
+
+    def compiled(self, first: int = 0) -> None:
+        """Machine code is there: time runs from here, where so many frames are simulated already."""
         if self.compiling is not None:
             self.compiling.cancel()
-        self.started = time.perf_counter()
+        self.started, self.first = time.perf_counter(), first
 
     def _announce(self) -> None:
-        self.stream.write("compiling the effects of this scene for this machine, once (kept for later runs) ...\n")
-        self.stream.flush()
+        self.tell("compiling the effects of this scene for this machine, once (kept for later runs) ...")
 
     def update(self, done: int) -> None:
         """`done` frames of the file are simulated."""
@@ -50,8 +56,8 @@ class Progress:
         if not self.bar or (now - self.shown < EVERY and done < self.frames):
             return
         self.shown = now
-        spent, part = max(now - self.started, 1e-9), done / max(self.frames, 1)
-        rate, left = done / spent, (self.frames - done) * spent / max(done, 1)
+        spent, new, part = max(now - self.started, 1e-9), done - self.first, done / max(self.frames, 1)
+        rate, left = new / spent, (self.frames - done) * spent / max(new, 1)
         full = int(WIDTH * part)
         self.stream.write(f"\r[{'#' * full}{'.' * (WIDTH - full)}] {done}/{self.frames} frames  "
                           f"{rate * self.substeps:,.0f} steps/s  {left:.0f} s left\033[K")

@@ -1,149 +1,208 @@
-"""One scene, from its start to a finished trajectory file."""
+"""One scene, from its start or from where an earlier process stopped, to a finished trajectory file."""
 
+import glob
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import CONTACTS, ERROR_MAX, FRAME, PENETRATION, RELAXATIONS, Array, Frames
+from verlet_numba.buffers import FRAME, Array, Frames
 from verlet_numba.frame import DIVERGED, OK
+from verlet_numba.run import checkpoint
 from verlet_numba.run.contents import contents, now, observables
 from verlet_numba.run.engine import State, run_chunk, start, warm
-from verlet_numba.run.postmortem import Divergence, examine
+from verlet_numba.run.lock import Lock
+from verlet_numba.run.postmortem import examine
 from verlet_numba.run.progress import Progress
-from verlet_numba.run.signals import StopSignals
-from verlet_numba.run.trajectory import TrajectoryFile
+from verlet_numba.run.resume import Found, ended, find, hold_against, usable
+from verlet_numba.run.signals import Interrupted, StopSignals
+from verlet_numba.run.space import require
+from verlet_numba.run.summary import BROKEN, COMPLETE, STOPPED, Summary
+from verlet_numba.run.trajectory import TEMPORARY, TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
-from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
+from verlet_numba.scene.plan import CHUNK_BYTES, file_bytes, frame_bytes, frame_count
 from verlet_numba.scene.prepare import Prepared
 
+__all__ = ["BROKEN", "COMPLETE", "STOPPED", "Summary", "simulate"]
+
 CHUNK_SECONDS = 0.4         # wall time of a chunk, so that signals and progress stay responsive
-COMPLETE, STOPPED, BROKEN = "complete", "stopped", "diverged"
-
-
-@dataclass
-class Summary:
-    """What a run was like. Extremes are over the frames of the file."""
-
-    output: str
-    frames: int = 0
-    substeps: int = 0
-    simulated_seconds: float = 0.0
-    status: str = COMPLETE
-    relaxations: int = 0
-    contacts: int = 0                       # most of any frame
-    constraint_error_max: float = 0.0
-    penetration_max: float = 0.0
-    seconds: dict[str, float] = field(default_factory=dict)      # wall time by phase
-    chunks: list[tuple[int, float, float]] = field(default_factory=list)    # frames, seconds simulated, seconds handed over
-    divergence: Divergence | None = None
-    signal: int | None = None
-
-    @property
-    def steps_per_second(self) -> float:
-        return self.substeps / self.seconds["simulate"] if self.seconds.get("simulate") else 0.0
-
-    @property
-    def real_time_factor(self) -> float:
-        return self.simulated_seconds / self.seconds["simulate"] if self.seconds.get("simulate") else 0.0
-
-    def timing(self) -> dict[str, Any]:
-        """Wall seconds by phase and by chunk."""
-        frames, simulate, write = zip(*self.chunks, strict=True) if self.chunks else ((), (), ())
-        return {"phases": self.seconds, "chunks": {"frames": frames, "simulate": simulate, "write": write}}
-
-    def as_dict(self) -> dict[str, Any]:
-        keys = ("output", "status", "frames", "substeps", "simulated_seconds", "relaxations", "contacts",
-                "constraint_error_max", "penetration_max", "steps_per_second", "real_time_factor", "seconds", "signal")
-        return {key: getattr(self, key) for key in keys} | {
-            "divergence": self.divergence.as_dict() if self.divergence else None}
+CHECKPOINT_SECONDS = 10.0   # from one checkpoint to the next, at least
+CHECKPOINT_SHARE = 50       # and as many times what the last one took: 2 % of the run at most
+CHECKPOINTS = 3             # on the disk at a time: the last, the one before, and the next in the making
 
 
 def simulate(prepared: Prepared, output: Path, *, count: int | None = None, command: str = "", overwrite: bool = False,
-             threads: int = 2, quiet: bool = False) -> Summary:
+             resume: bool = False, threads: int = 2, max_time: float | None = None, quiet: bool = False) -> Summary:
     """Simulate a scene and write its trajectory; `count`: frames after frame 0 instead of the scene's duration.
 
-    Raises OSError (FileExistsError among them) if the file cannot be made or written; frames written before stay.
+    `resume`: go on with the file if there is one; one that is complete or diverged is left as it is. `max_time`: wall
+    seconds after which to stop with a checkpoint. The summary's `status` is complete, diverged or stopped: by a signal if
+    `signal` is a number, else by the time. May be called in any thread; signals are noticed in the main one.
+
+    Raises BusyError if somebody else writes the file, ResumeError (a ValueError) if it is not of this run, SpaceError or
+    another OSError (FileExistsError among them) if it cannot be made or written. Frames that are written stay, and the run
+    can be resumed.
     """
-    summary = Summary(str(output))
     clock = time.perf_counter()
-    model = build(prepared.scene, prepared.bodies, prepared.loaded.folder)
     total = frame_count(prepared.scene) if count is None else count + 1
-    summary.seconds["build"] = time.perf_counter() - clock
-    with Progress(total, prepared.scene.solver.substeps, quiet) as progress:
-        compile_kernels(model, progress, summary)
-        with StopSignals() as signals, TrajectoryFile(output, contents(prepared, model, command), total, overwrite,
-                                                      beside=threads > 1) as file:
-            advance_all(model, file, total, progress, summary, signals)
+    with Lock(output), StopSignals() as signals, Progress(total, prepared.scene.solver.substeps, quiet) as progress:
+        remove_leftovers(output)
+        found = find(output) if resume and output.exists() else None
+        if found is not None:
+            hold_against(output, found, prepared.scene, total)
+            if found.status in (COMPLETE, BROKEN):
+                checkpoint.remove(output)
+                return ended(output, found, prepared.scene)
+        run = Run(prepared, output, total, progress, found,
+                  lambda: signals.stop() or (max_time is not None and time.perf_counter() - clock > max_time))
+        try:
+            with signals.prompt():
+                run.make_ready()
+        except Interrupted:
+            run.summary.status = STOPPED
+        else:
+            run.write(command, overwrite, threads)
+    if run.summary.status == STOPPED:
+        run.summary.signal = signals.number
+    return run.summary
+
+
+def remove_leftovers(output: Path) -> None:
+    """Trajectories without a name that killed processes have left behind: whoever has the lock may."""
+    for path in output.parent.glob(f".{glob.escape(output.name)}.{TEMPORARY}.part"):
+        path.unlink(missing_ok=True)
+
+
+@dataclass
+class Run:
+    """A run under way. `found`: what an earlier process has written of it; `stop` is asked whether to leave off."""
+
+    prepared: Prepared
+    output: Path
+    total: int
+    progress: Progress
+    found: Found | None
+    stop: Callable[[], bool]
+    summary: Summary = field(init=False)
+    model: Model = field(init=False)
+    origin: dict[str, str] = field(init=False)
+    due: float = field(init=False)              # when the next checkpoint is
+
+    def __post_init__(self) -> None:
+        self.summary = Summary(str(self.output))
+
+    def make_ready(self) -> None:
+        """Build the world, make or load its machine code, and put it where the run begins or goes on."""
+        clock = time.perf_counter()
+        self.model = start(build(self.prepared.scene, self.prepared.bodies, self.prepared.loaded.folder))
+        self.origin = checkpoint.origin(self.model.world)
+        last = None if self.found is None else usable(self.output, self.found, self.origin)
+        if last is not None:
+            self.summary = Summary.going_on(str(self.output), last.summary)
+        elif self.found is not None:
+            self.summary.resumed_at = 0
+        self.summary.spend("build", time.perf_counter() - clock)
+        require(self.output, self.bytes_to_write())
+        self.tell_where()
+        self.compile_kernels()
+        if last is not None:
+            self.model.world = checkpoint.restored(self.model.world, last.arrays)
+
+    def bytes_to_write(self) -> int:
+        """What this process may still add to the disk, at most."""
+        there = self.output.stat().st_size if self.found is not None else 0
+        return max(0, file_bytes(self.prepared, self.model, self.total) - there) + CHECKPOINTS * checkpoint.size(self.model.world)
+
+    def tell_where(self) -> None:
+        if self.summary.resumed_at:
+            self.progress.tell(f"{self.output}: goes on with frame {self.summary.frames} of {self.total}")
+        elif self.found is not None:
+            self.progress.tell(f"{self.output}: no checkpoint can be used; simulated again from frame 0 on, and held against the "
+                               f"{self.found.frames} frames that are there")
+
+    def compile_kernels(self) -> None:
+        clock = time.perf_counter()
+        self.progress.may_compile()
+        warm(self.model)
+        self.progress.compiled(self.summary.frames)
+        self.summary.spend("compile", time.perf_counter() - clock)
+
+    def write(self, command: str, overwrite: bool, threads: int) -> None:
+        """Simulate to the end, a divergence or a stop, and finish the file; without its end reached, keep a checkpoint."""
+        with TrajectoryFile(self.output, contents(self.prepared, self.model, command), self.total, overwrite,
+                            resume_at=None if self.found is None else self.summary.frames, beside=threads > 1) as file:
+            if self.found is None:
+                checkpoint.remove(self.output)      # it belongs to a file that is no more, or will be replaced
+            self.advance_all(file)
+            if self.summary.status == STOPPED:
+                self.keep(file)
             clock = time.perf_counter()
             file.flush()
-            summary.seconds["write"] += time.perf_counter() - clock
-            file.finish(summary.status, now(), summary.timing())
-    return summary
+            self.summary.spend("write", time.perf_counter() - clock)
+            file.finish(self.summary.status, now(), self.summary.timing())
+        if self.summary.status != STOPPED:
+            checkpoint.remove(self.output)
 
+    def advance_all(self, file: TrajectoryFile) -> None:
+        """Chunk after chunk, each handed to the file while the next is simulated, until the end, a divergence or a stop.
 
-def compile_kernels(model: Model, progress: Progress, summary: Summary) -> None:
-    """Make or load the machine code of this scene's run, and put the model at its start."""
-    clock = time.perf_counter()
-    progress.may_compile()
-    warm(start(model))
-    progress.compiled()
-    summary.seconds["compile"] = time.perf_counter() - clock
+        Something is always done before `stop` is asked: a command with a short `--max-time` that is repeated comes to its end.
+        """
+        summary, model = self.summary, self.model
+        most = max(1, CHUNK_BYTES // frame_bytes(model))
+        size, chunk = 1, frames(model, 1)
+        self.due = time.perf_counter() + CHECKPOINT_SECONDS
+        while summary.status == COMPLETE and summary.frames < self.total:
+            size = min(size, most, self.total - summary.frames)
+            if size != len(chunk.measures):
+                chunk = frames(model, size)
+            before = State.of(model)
+            clock = time.perf_counter()
+            status = run_chunk(model, chunk, self.stop)
+            took = time.perf_counter() - clock
+            sound = size if status == OK else int(model.world.clock[FRAME])
+            self.store(file, chunk, sound, took)
+            if status == DIVERGED:
+                summary.status = BROKEN
+                summary.divergence = examine(model, before, (sound + 2) * model.world.solver.substeps)
+            elif summary.frames < self.total and self.stop():
+                summary.status = STOPPED
+            elif time.perf_counter() > self.due:
+                self.keep(file)
+            size = next_size(size, took)
 
-
-def advance_all(model: Model, file: TrajectoryFile, total: int, progress: Progress, summary: Summary,
-                signals: StopSignals) -> None:
-    """Chunk after chunk, each handed to the file while the next is simulated, until the end, a divergence or a signal."""
-    summary.seconds.update(simulate=0.0, write=0.0)
-    most = max(1, CHUNK_BYTES // frame_bytes(model))
-    size, chunk = 1, frames(model, 1)
-    while summary.frames < total and summary.divergence is None and not signals.stop():
-        size = min(size, most, total - summary.frames)
-        if size != len(chunk.measures):
-            chunk = frames(model, size)
-        before = State.of(model)
-        clock = time.perf_counter()
-        status = run_chunk(model, chunk, signals.stop)
-        took = time.perf_counter() - clock
-        sound = size if status == OK else int(model.world.clock[FRAME])
-        clock = time.perf_counter()
-        store(model, file, chunk, sound, summary)
+    def store(self, file: TrajectoryFile, chunk: Frames, sound: int, took: float) -> None:
+        """Hand the sound frames of a chunk, which took so many seconds, to the file and to the summary."""
+        clock, scene, summary = time.perf_counter(), self.prepared.scene, self.summary
+        if sound:
+            number = summary.frames + np.arange(sound)
+            fields: dict[str, Array] = {"position": chunk.position[:sound]}
+            if chunk.velocity is not None:
+                fields["velocity"] = chunk.velocity[:sound]
+            measures = chunk.measures[:sound]
+            file.append(number / scene.time.frame_rate, number * scene.solver.substeps, fields,
+                        observables(measures) if scene.output.observables else {})
+            summary.count(scene, measures)
         wrote = time.perf_counter() - clock
-        summary.seconds["simulate"] += took
-        summary.seconds["write"] += wrote
+        summary.spend("simulate", took)
+        summary.spend("write", wrote)
         summary.chunks.append((sound, took, wrote))
-        progress.update(summary.frames)
-        if status == DIVERGED:
-            summary.status = BROKEN
-            summary.divergence = examine(model, before, (sound + 2) * model.world.solver.substeps)
-        size = next_size(size, took)
-    if signals.number and summary.status == COMPLETE and summary.frames < total:
-        summary.status, summary.signal = STOPPED, signals.number
+        self.progress.update(summary.frames)
+
+    def keep(self, file: TrajectoryFile) -> None:
+        """A checkpoint, behind the frames that it counts."""
+        clock = time.perf_counter()
+        file.flush(sync=True)
+        if file.frames:
+            checkpoint.write(self.output, self.origin, self.summary.so_far(), self.model.world)
+        took = time.perf_counter() - clock
+        self.summary.spend("write", took)
+        self.due = clock + took + max(CHECKPOINT_SECONDS, CHECKPOINT_SHARE * took)
 
 
 def next_size(size: int, took: float) -> int:
     """Frames of the next chunk: a power of two, so that it seldom changes, of about CHUNK_SECONDS; at most eight times as many."""
     wished = min(8.0 * size, size * CHUNK_SECONDS / max(took, 1e-6))
     return 1 << max(0, int(wished).bit_length() - 1)
-
-
-def store(model: Model, file: TrajectoryFile, chunk: Frames, sound: int, summary: Summary) -> None:
-    """Hand the sound frames of a chunk to the file, and take their extremes into the summary."""
-    if not sound:
-        return
-    scene, measures = model.scene, chunk.measures[:sound]
-    number = summary.frames + np.arange(sound)
-    fields: dict[str, Array] = {"position": chunk.position[:sound]}
-    if chunk.velocity is not None:
-        fields["velocity"] = chunk.velocity[:sound]
-    file.append(number / scene.time.frame_rate, number * scene.solver.substeps, fields,
-                observables(measures) if scene.output.observables else {})
-    summary.frames += sound
-    summary.substeps = (summary.frames - 1) * scene.solver.substeps
-    summary.simulated_seconds = (summary.frames - 1) / scene.time.frame_rate
-    summary.relaxations += int(measures[:, RELAXATIONS].sum())
-    summary.contacts = max(summary.contacts, int(measures[:, CONTACTS].max()))
-    summary.constraint_error_max = max(summary.constraint_error_max, float(measures[:, ERROR_MAX].max()))
-    summary.penetration_max = max(summary.penetration_max, float(measures[:, PENETRATION].max()))

@@ -24,8 +24,13 @@ from verlet_numba.run.ordered_file import OrderedFile
 
 __all__ = ["BodyTable", "Contents", "Quantity", "TrajectoryFile"]
 
+TEMPORARY = "[0-9a-f]" * 8      # a pattern: what makes the name unique that a file has before its first commit
 UNDER_WAY = 2       # blocks that may wait for the disk while the simulation goes on
 CACHE_BYTES = 65536 # of HDF5 for the chunks of each dataset: they are written once, and its 8 MiB each would grow with the run
+
+
+class DifferenceError(ValueError):
+    """Frames simulated again are not those that a file has."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,8 @@ class TrajectoryFile:
                  resume_at: int | None = None, beside: bool = True) -> None:
         """`beside`: write while the caller goes on, instead of waiting for each block.
 
-        `resume_at`: go on with the existing file; the first frame appended is this one, what it has already is kept.
+        `resume_at`: go on with the existing file; the first frame appended is this one. What it has already is kept, and
+        what is appended again must equal it.
 
         Raises FileExistsError if `path` exists (without `overwrite` and `resume_at`), another OSError if its folder
         cannot be written to, ValueError if the file to go on with has fewer than `resume_at` frames or other particles.
@@ -126,7 +132,8 @@ class TrajectoryFile:
         """k frames: time (k,) s, step (k,), fields name -> (k, N, 3), observables name -> (k,) or (k, 3); all copied.
 
         Returns while they are being written. Raises OSError if an earlier block could not be written, with the frames
-        up to the last commit intact; nothing can be appended after that. Raises ValueError beyond the planned frames.
+        up to the last commit intact, DifferenceError if it differs from what the file has; nothing can be appended after
+        that. Raises ValueError beyond the planned frames.
         """
         rows = dict.fromkeys(("particles/trajectory/time", "VTKHDF/Steps/Values"), np.array(time, np.float64))
         rows["particles/trajectory/step"] = np.array(step, np.int64)
@@ -140,10 +147,12 @@ class TrajectoryFile:
         if not self._most_under_way:
             self._wait(0)
 
-    def flush(self) -> None:
-        """Commit every frame appended so far. Raises OSError as `append` does."""
+    def flush(self, sync: bool = False) -> None:
+        """Commit every frame appended so far, and with `sync` wait for the disk. Raises OSError as `append` does."""
         self._wait(0)
         self._thread.submit(self._write_rest).result()
+        if sync:
+            self._disk.sync()
 
     def finish(self, status: str, end: str, timing: Mapping[str, Any]) -> None:
         """Commit every frame, state how and when (ISO 8601) the run ended and where its wall seconds went, and close.
@@ -207,12 +216,10 @@ class TrajectoryFile:
             raise ValueError(f"{self.path} has {committed} frames of {particles} particles; "
                              f"cannot go on at frame {frame} with {self._contents.particles}")
         self.frames, self._appended = committed, frame
-        self._skip = committed - frame              # appended frames that the file has already
+        self._known = range(frame, committed)       # frames still to be appended that the file has already
         self._stored = committed - committed % self._chunk_frames       # frames in full chunks
         self._raw = self._stored < committed        # the chunk behind them is on the disk, uncompressed
-        rest = slice(self._stored, committed)
-        self._rest = _Block({path: self._file[path][rest] for path in self._rows},
-                            {name: self._file[f"particles/trajectory/{name}/value"][rest] for name in self._fields})
+        self._rest = self._read(self._stored, committed)
         self._file["provenance/status"][()] = "running"
 
     # Writing, in the background thread
@@ -220,17 +227,35 @@ class TrajectoryFile:
     def _write(self, block: _Block) -> None:
         """Store and commit every chunk that is full; keep the rest."""
         self._disk.check()
-        skipped = min(self._skip, len(block))
-        self._skip -= skipped
-        block = block[skipped:]
         for frames in block.fields.values() if self._contents.precision_bits < 24 else ():
             round_mantissa(frames, self._contents.precision_bits)
+        block = self._new(block)
         block = self._rest + block if len(self._rest) else block
         full = len(block) - len(block) % self._chunk_frames
         if full:
             self._store(block[:full])
             self._stored, self._raw = self._stored + full, False
         self._rest = block[full:]
+
+    def _new(self, block: _Block) -> _Block:
+        """What the file does not have yet; what it has is held against it."""
+        if not self._known:
+            return block
+        known, self._known = self._known[:len(block)], self._known[len(block):]
+        again, there = block[:len(known)], self._read(known.start, known.stop)
+        for mine, theirs in ((again.rows, there.rows), (again.fields, there.fields)):
+            for name, data in mine.items():
+                differs = (data != theirs[name]).reshape(len(known), -1).any(1)
+                if differs.any():
+                    raise DifferenceError(f"{self.path}: frame {known[int(differs.argmax())]} as simulated now differs in {name}; "
+                                          "another scene, program or machine has written it")
+        return block[len(known):]
+
+    def _read(self, first: int, last: int) -> _Block:
+        """Frames of the file."""
+        part = slice(first, last)
+        return _Block({path: self._file[path][part] for path in self._rows},
+                      {name: self._file[f"particles/trajectory/{name}/value"][part] for name in self._fields})
 
     def _write_rest(self) -> None:
         self._disk.check()

@@ -44,7 +44,7 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
                     "copies_a_block": group.block, "lanes": lanes(model, group)} for group in model.numbering.groups],
         "buffers": sizes,
         "memory_bytes": INTERPRETER + MEETING * bodies_meet(model.world) + int((1 + BUILDING) * total) + 3 * chunk_bytes(model),
-        "file_bytes_at_most": file_bytes(prepared, model)}
+        "file_bytes_at_most": file_bytes(prepared, model, frame_count(scene))}
 
 
 def bodies_meet(world: World) -> bool:
@@ -234,9 +234,9 @@ def chunk_bytes(model: Model) -> int:
     return min(max(frame_bytes(model), CHUNK_BYTES), frame_bytes(model) * frame_count(model.scene))
 
 
-def file_bytes(prepared: Prepared, model: Model) -> int:
-    """Size of the file if nothing could be compressed, the last chunk of everything included."""
-    scene, count, fields = prepared.scene, frame_count(prepared.scene), 1 + len(prepared.scene.output.fields)
+def file_bytes(prepared: Prepared, model: Model, count: int) -> int:
+    """Size of the file of so many frames if nothing could be compressed, the last chunk of everything included."""
+    scene, fields = prepared.scene, 1 + len(prepared.scene.output.fields)
     field = frame_bytes(model) - FRAME_MEASURES
     unfilled = FRAME_MEASURES * min(count, FILE_ROWS) + min(field * count, max(field, fields * FILE_CHUNK))
     frames = frame_bytes(model) * count + unfilled

@@ -110,7 +110,7 @@ def run_case(prepared: Prepared, quiet: bool = False) -> Case:
     with tempfile.TemporaryDirectory(prefix="verlet-numba-") as folder:
         output = Path(folder) / "trajectory.vtkhdf"
         summary = simulate(prepared, output, command="verify", quiet=quiet)
-        case.seconds, case.signal = summary.seconds["simulate"], summary.signal
+        case.seconds, case.signal = summary.seconds.get("simulate", 0.0), summary.signal
         case.trouble = trouble_of(summary)
         if summary.frames:
             with reader.open(output) as trajectory:
