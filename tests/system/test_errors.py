@@ -157,6 +157,9 @@ def test_divergence_is_named_and_the_good_frames_are_kept(verlet, write_scene, t
     summary = json.loads(done.stdout)
     assert (summary["status"], summary["frames"], summary["divergence"]["step"]) == ("diverged", count, step)
     assert (summary["divergence"]["body"], summary["divergence"]["particle"]) == ("sheet", int(named[3]))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "x.vtkhdf"]
+    again = verlet("run", "scene.yaml", "-o", "x.vtkhdf", "--resume", cwd=tmp_path, code=3)
+    assert "diverged in an earlier run of x.vtkhdf" in again.stderr
 
 
 def limited(size):
@@ -202,7 +205,7 @@ def test_signals_end_a_run_with_its_file_finished(write_scene, tmp_path, number)
     assert f"{count} frames are kept in {output}" in errors
     assert f"stopped, {count} frames" in told
     assert count < 6_000_000
-    assert [path.name for path in tmp_path.iterdir() if path != output] == ["scene.yaml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "x.vtkhdf", "x.vtkhdf.checkpoint"]
 
 
 def wait_for(path: Path, process: "subprocess.Popen[str]") -> None:

@@ -5,7 +5,28 @@ import warnings
 import numpy as np
 import pytest
 
+from verlet_numba.run.simulate import simulate
+from verlet_numba.scene.prepare import prepare
+
 POSITION, VELOCITY = "particles/trajectory/position/value", "particles/trajectory/velocity/value"
+
+
+@pytest.fixture(scope="module", params=["whole", "resumed"])
+def mixed(request, mixed, tmp_path_factory):
+    """Also the file of a run that stopped after each of its first ten frames."""
+    if request.param == "whole":
+        return mixed
+    prepared, path = prepare(mixed.scene), tmp_path_factory.mktemp("resumed") / "mixed.vtkhdf"
+    for _ in range(10):
+        assert simulate(prepared, path, resume=True, max_time=1e-9, quiet=True).status == "stopped"
+    assert simulate(prepared, path, resume=True, quiet=True).resumed_at == 10
+    return mixed._replace(trajectory=path)
+
+
+def test_a_resumed_file_is_that_of_an_undisturbed_run(mixed, found, datasets):
+    whole = datasets(mixed.folder / "mixed.vtkhdf")
+    differ = {path for path in found.keys() | whole.keys() if not np.array_equal(found[path], whole[path])}
+    assert differ <= {f"provenance/{name}" for name in ("start", "end", "timing", "command")}
 
 
 @pytest.fixture(scope="module")

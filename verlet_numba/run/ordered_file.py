@@ -76,8 +76,12 @@ class OrderedFile:
             self.committed = self.length
 
     def sync(self) -> None:
-        """Wait until the disk has what is committed. Raises OSError."""
-        os.fsync(self.descriptor)
+        """Wait until the disk has what is committed. Raises OSError as `check` does."""
+        try:
+            os.fsync(self.descriptor)
+        except OSError as error:
+            self.failure = self.failure or error
+        self.check()
 
     def check(self) -> None:
         """Raise the first failed write's OSError, with the file's name."""

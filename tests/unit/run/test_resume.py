@@ -4,6 +4,7 @@ import errno
 import json
 import multiprocessing
 import os
+import resource
 import shutil
 import signal
 import threading
@@ -39,15 +40,16 @@ HEAP = {"time": {"duration": 4, "frame_rate": 30}, "solver": {"substeps": 8},
         "colliders": [{"kind": "room", "size": [0.8, 0.8, 4], "position": [0, 0, 2]}]}
 
 
+def write(folder, mapping):
+    """The mapping as a scene file in a folder, prepared."""
+    (folder / "scene.yaml").write_text(json.dumps({"version": 1, "name": "scene", **mapping}), encoding="utf-8")
+    return prepare(folder / "scene.yaml")
+
+
 @pytest.fixture
 def scene(tmp_path):
     """scene(mapping): this scene as a file, prepared."""
-
-    def make(mapping):
-        (tmp_path / "scene.yaml").write_text(json.dumps({"version": 1, "name": "scene", **mapping}), encoding="utf-8")
-        return prepare(tmp_path / "scene.yaml")
-
-    return make
+    return lambda mapping: write(tmp_path, mapping)
 
 
 @pytest.fixture
@@ -61,11 +63,17 @@ def run(prepared, path, **options) -> Summary:
 
 
 def datasets(path):
-    """Every dataset but those of the process, by path."""
-    found = {}
+    """Every dataset but those of the process, under every name."""
     with h5py.File(path, locking=False) as file:
-        file.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
-    return {name: data for name, data in found.items() if name not in OF_THE_PROCESS}
+        return {name: data for name, data in walk(file, "") if name not in OF_THE_PROCESS}
+
+
+def walk(group, place):
+    for name, item in group.items():
+        if isinstance(item, h5py.Dataset):
+            yield place + name, item[()]
+        else:
+            yield from walk(item, f"{place}{name}/")
 
 
 def assert_same(a, b):
@@ -135,17 +143,25 @@ def test_buffers_that_have_grown_are_kept_as_they_are(tmp_path):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.fixture(scope="module")
+def half(tmp_path_factory):
+    """A folder with a rope's scene, its whole run, and a run that has stopped several times."""
+    folder = tmp_path_factory.mktemp("half")
+    prepared = write(folder, ROPE)
+    run(prepared, folder / "whole.vtkhdf")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("verlet_numba.run.engine.BUDGET", 3)
+        for _ in range(13):         # two a frame
+            run(prepared, folder / "a.vtkhdf", resume=True, max_time=AT_ONCE)
+    assert in_folder(folder) == ["a.vtkhdf", "a.vtkhdf.checkpoint", "a.vtkhdf.checkpoint.previous", "whole.vtkhdf"]
+    return folder
+
+
 @pytest.fixture
-def stopped(scene, pieces, tmp_path):
-    """A prepared rope, the file of its whole run, and a file that stopped twice, with its two checkpoints."""
-    prepared, path = scene(ROPE), tmp_path / "a.vtkhdf"
-    run(prepared, tmp_path / "whole.vtkhdf")
-    pieces(3)
-    for _ in range(12):
-        run(prepared, path, resume=True, max_time=AT_ONCE)
-    pieces(64)
-    assert in_folder(tmp_path) == ["a.vtkhdf", "a.vtkhdf.checkpoint", "a.vtkhdf.checkpoint.previous", "whole.vtkhdf"]
-    return prepared, tmp_path / "whole.vtkhdf", path
+def stopped(half, tmp_path):
+    """A prepared rope, the file of its whole run, and a file with 7 frames and checkpoints of 7 and of 6 frames."""
+    shutil.copytree(half, tmp_path, dirs_exist_ok=True)
+    return prepare(tmp_path / "scene.yaml"), tmp_path / "whole.vtkhdf", tmp_path / "a.vtkhdf"
 
 
 @pytest.mark.parametrize(("damaged", "resumed_at"), [((0,), 6), ((0, 1), 0), ((1,), 7)])
@@ -231,12 +247,16 @@ def test_a_checkpoint_without_room_is_an_oserror_and_the_run_goes_on_later(stopp
     prepared, whole, path = stopped
 
     def full(descriptor):
-        raise OSError(errno.ENOSPC, "No space left on device")
+        if next(good) is None:
+            raise OSError(errno.ENOSPC, "No space left on device")
 
-    with monkeypatch.context() as patch:
-        patch.setattr("verlet_numba.run.checkpoint.os.fsync", full)
-        with pytest.raises(OSError, match=r"No space left.*a\.vtkhdf"):
-            run(prepared, path, resume=True, max_time=AT_ONCE)
+    for calls, name in (([None], r"a\.vtkhdf'"), ([1, None], r"a\.vtkhdf\.checkpoint'")):
+        good = iter(calls)
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", full)
+            with pytest.raises(OSError, match=rf"No space left.*{name}"):
+                run(prepared, path, resume=True, max_time=AT_ONCE)
+        assert in_folder(path.parent) == ["a.vtkhdf", "a.vtkhdf.checkpoint", "a.vtkhdf.checkpoint.previous", "whole.vtkhdf"]
     assert run(prepared, path, resume=True).status == "complete"
     assert_same(whole, path)
 
@@ -260,6 +280,25 @@ def killed(prepared, path, seconds):
     process.join()
     assert process.exitcode in (0, -signal.SIGKILL)
     return process.exitcode != 0
+
+
+def limited(prepared, path):
+    """In a process that may not write files beyond 300 kB, as on a full disk."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+    with pytest.raises(OSError, match="File too large"):
+        run(prepared, path)
+
+
+def test_a_run_goes_on_when_a_full_disk_has_room_again(scene, tmp_path):
+    prepared, path = scene({**ROPE, "time": {"duration": 50}}), tmp_path / "a.vtkhdf"
+    run(prepared, tmp_path / "whole.vtkhdf")
+    process = multiprocessing.get_context("fork").Process(target=limited, args=(prepared, path))
+    process.start()
+    process.join()
+    assert process.exitcode == 0
+    assert 0 < committed(path, datasets(tmp_path / "whole.vtkhdf")) < 3001
+    assert run(prepared, path, resume=True).status == "complete"
+    assert_same(tmp_path / "whole.vtkhdf", path)
 
 
 @pytest.mark.parametrize("kills", [6, pytest.param(200, marks=pytest.mark.validate)])
