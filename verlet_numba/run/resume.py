@@ -1,6 +1,7 @@
 """Where a run goes on: what stands in its trajectory file, and which checkpoint fits it."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,12 +60,15 @@ def hold_against(path: Path, found: Found, scene: Scene, total: int) -> None:
 
 def first_difference(there: Any, here: Any, path: str = "") -> str | None:
     """The first key, in words, in which two scenes as plain data differ; None if there is none."""
-    if type(there) is type(here) and isinstance(there, dict | list) and len(there) == len(here):
-        keys = list(there) if isinstance(there, dict) else range(len(there))
-        if isinstance(there, list) or there.keys() == here.keys():
-            below = (first_difference(there[key], here[key], f"{path}.{key}" if path else str(key)) for key in keys)
-            return next((found for found in below if found is not None), None)
-    return None if there == here else f"{path or 'it'} is {brief(there)} there, {brief(here)} here"
+    pairs: Iterable[tuple[Any, Any, Any]] = ()
+    if isinstance(there, dict) and isinstance(here, dict):
+        pairs = ((key, there.get(key), here.get(key)) for key in there | here)
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        pairs = ((number, a, b) for number, (a, b) in enumerate(zip(there, here, strict=True)))
+    elif there != here:
+        return f"{path} is {brief(there)} there, {brief(here)} here"
+    found = (first_difference(a, b, f"{path}.{key}".lstrip(".")) for key, a, b in pairs)
+    return next((words for words in found if words is not None), None)
 
 
 def brief(value: Any, most: int = 60) -> str:

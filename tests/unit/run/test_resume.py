@@ -17,7 +17,7 @@ import pytest
 import worlds
 
 from verlet_numba.run import checkpoint
-from verlet_numba.run.resume import ResumeError
+from verlet_numba.run.resume import ResumeError, first_difference
 from verlet_numba.run.simulate import Summary, simulate
 from verlet_numba.run.space import SpaceError
 from verlet_numba.run.trajectory import DifferenceError
@@ -215,6 +215,14 @@ def test_files_of_other_scenes_and_no_trajectories_are_refused(stopped, scene, t
     for name in ("text", "other"):
         with pytest.raises(ResumeError, match=f"{name} is no trajectory"):
             run(prepared, tmp_path / name, resume=True)
+
+
+@pytest.mark.parametrize(("there", "here", "words"), [
+    ({"a": [1, {"b": 2}]}, {"a": [1, {"b": 2}]}, None), ({"a": [1, {"b": 2}]}, {"a": [1, {"b": 3}]}, "a.1.b is 2 there, 3 here"),
+    ({}, {"a": {"b": "x" * 90}}, 'a is null there, {"b": "' + "x" * 50 + "... here"), ({"a": 1}, {}, "a is 1 there, null here"),
+    ({"a": [1]}, {"a": [1, 2]}, "a is [1] there, [1, 2] here"), ({"a": []}, {"a": {}}, "a is [] there, {} here")])
+def test_differences_of_scenes_are_named(there, here, words):
+    assert first_difference(there, here) == words
 
 
 def test_what_is_complete_is_left_as_it_is(stopped):
