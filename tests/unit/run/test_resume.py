@@ -96,14 +96,14 @@ CASES = {"pendulum": PENDULUM, "rope": ROPE, "cloth": CLOTH, "everything": world
          "heap": HEAP}
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.validate] * (name == "heap")) for name in CASES])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.validate] * (name in ("cloth", "heap"))) for name in CASES])
 def test_a_run_that_stops_again_and_again_has_the_datasets_of_an_undisturbed_one(scene, pieces, tmp_path, name):
     prepared = scene(CASES[name])
     whole = run(prepared, tmp_path / "whole.vtkhdf")
     pieces(3)
     stops, before, path = 0, 0, tmp_path / "parts.vtkhdf"
     while (summary := run(prepared, path, resume=True, max_time=AT_ONCE)).status == "stopped":
-        assert (summary.signal, summary.resumed_at or 0) == (None, before)
+        assert (summary.signal, summary.resumed_at) == (None, before or None)
         stops, before = stops + 1, summary.frames
     assert stops > 1.5 * (whole.frames - 1)         # most of them in the middle of a frame
     assert (summary.status, summary.resumed_at) == ("complete", before)
@@ -272,7 +272,7 @@ def test_a_checkpoint_without_room_is_an_oserror_and_the_run_goes_on_later(stopp
 def test_a_thread_may_run_it(scene, tmp_path):
     """As the workers of a cluster do; Python lets only the main thread listen to signals."""
     found = []
-    thread = threading.Thread(target=lambda: found.append(run(scene(PENDULUM), tmp_path / "a.vtkhdf")))
+    thread = threading.Thread(target=lambda: found.append(run(scene(ROPE), tmp_path / "a.vtkhdf")))
     thread.start()
     thread.join()
     assert found[0].status == "complete"
