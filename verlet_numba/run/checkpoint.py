@@ -17,6 +17,7 @@ import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,13 @@ def origin(world: World) -> dict[str, str]:
     for path, array in arrays(world):
         digest.update(f"{path} {array.dtype.str} {array.shape}\n".encode())
         digest.update(raw(array))
-    return {"start": digest.hexdigest(), "kernels": sources(), "numba": version("numba"), "verlet-numba": __version__}
+    return {"start": digest.hexdigest()} | program()
+
+
+@cache
+def program() -> dict[str, str]:
+    """What this program is, as far as a simulation depends on it."""
+    return {"kernels": sources(), "numba": version("numba"), "verlet-numba": __version__}
 
 
 def arrays(part: Any, path: str = "") -> Iterator[tuple[str, Array]]:

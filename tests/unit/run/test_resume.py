@@ -189,10 +189,9 @@ def test_checkpoints_of_another_simulation_are_refused(stopped, monkeypatch, how
     prepared, _, path = stopped
     words = {"kernels": r"another version of the program \(its kernels differ\)", "version": r"verlet-numba .* instead of 9\.9",
              "start": "of another start"}[how]
-    if how == "kernels":
-        monkeypatch.setattr(checkpoint, "sources", lambda: "changed")
-    if how == "version":
-        monkeypatch.setattr(checkpoint, "__version__", "9.9")
+    changed = {"kernels": {"kernels": "changed"}, "version": {"verlet-numba": "9.9"}, "start": {}}[how]
+    other = checkpoint.program() | changed
+    monkeypatch.setattr(checkpoint, "program", lambda: other)
     if how == "start":
         prepared.bodies[0].positions[0, 3, 1] += 1e-12
     before = path.read_bytes()
