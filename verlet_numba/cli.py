@@ -71,7 +71,7 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
 
     prepared = prepare(scene, sets)
     output = output or Path(default_name(prepared.scene, scene))
-    refuse_existing(output, overwrite or resume)
+    refuse_existing(output, overwrite or resume, "give another with -o, go on with it by --resume, or --overwrite")
     warn(prepared.warnings, quiet)
 
     from verlet_numba.run.resume import ResumeError
@@ -343,10 +343,10 @@ def default_name(scene: Any, path: Path) -> str:
     return f"{name or path.stem}.vtkhdf"
 
 
-def refuse_existing(output: Path, overwrite: bool) -> None:
+def refuse_existing(output: Path, overwrite: bool, ways: str = "give another with -o, or --overwrite") -> None:
     """Before any work: nothing that exists is overwritten unasked, and the folder must be there."""
     if output.exists() and not overwrite:
-        raise Misuse(f"{output} exists already; give another with -o, or --overwrite")
+        raise Misuse(f"{output} exists already; {ways}")
     if output.is_dir():
         raise Misuse(f"{output} is a folder; name a file with -o")
     if not output.parent.is_dir():
