@@ -9,6 +9,7 @@ A lost face and the vertex opposite to it are where the next search begins.
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.kernels.gjk import APART, MET, gjk
 from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
 from verlet_numba.kernels.meeting import holds, write
@@ -220,5 +221,5 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent, quiet=None):
         pair[listed] = i
         write(points, columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
         listed += 1
-    meetings.listed[0] = listed
+    meetings.listed[0] = listed if fits else NO_ROOM
     return fits

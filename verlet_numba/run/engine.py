@@ -70,7 +70,7 @@ def accelerate(world: World) -> None:
 
 
 def grown(world: World) -> World:
-    """The same world with room for twice the contacts; those listed so far in this substep are found again."""
+    """The same world with twice the room where a list was too short; what was listed so far in this substep is found again."""
     return world._replace(effects=roomier(world.effects))
 
 
