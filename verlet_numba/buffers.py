@@ -469,6 +469,22 @@ class Narrow(NamedTuple):
     seen: Array                 # (2S + 1,) int 1; of S corners: the flood that came by last, a queue; at the end: floods so far
 
 
+class Beside(NamedTuple):
+    """Scratch of the narrow phase on several threads: that of Narrow for every chunk of pairs."""
+
+    vertex: Array               # (J, 3, V) double m
+    label: Array                # (J, 2, V) int 1
+    weight: Array               # (J, 4) double 1
+    corner: Array               # (J, 3, F) int 1
+    across: Array               # (J, 3, F) int 1
+    plane: Array                # (J, 4, F) double 1
+    visible: Array              # (J, F) int 1
+    horizon: Array              # (J, 3F + 3) int 1
+    stack: Array                # (J, 3F + 3) int 1
+    seen: Array                 # (J, 2S + 1) int 1
+    found: Array                # (J,) int 1; where the chunk's meetings end
+
+
 class Manifold(NamedTuple):
     """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
 
@@ -506,6 +522,7 @@ class Meet(NamedTuple):
     spare: Pairs
     search: Search
     narrow: Narrow
+    beside: Beside | None       # None: one thread
     manifold: Manifold | None   # None: one contact a pair
     meetings: Meetings
     margin: float               # double m; how near two hulls are a contact
