@@ -75,9 +75,13 @@ def scalars(part: Any) -> list[Any]:
 
 
 def restored(part: Any, saved: dict[str, Array], path: str = "") -> Any:
-    """A world with saved arrays in place of its own, also where buffers had grown."""
+    """A world with saved arrays in place of its own, also where buffers had grown.
+
+    What is not among them stays: scratch that a run on another number of threads has not.
+    """
     return part._replace(**{
-        name: gate(saved[path + name], value.dtype) if isinstance(value, np.ndarray) else restored(value, saved, f"{path}{name}.")
+        name: restored(value, saved, f"{path}{name}.") if isinstance(value, tuple) else
+        gate(saved.get(path + name, value), value.dtype)
         for name, value in part._asdict().items() if isinstance(value, np.ndarray | tuple)})
 
 

@@ -12,7 +12,7 @@ from verlet_numba.buffers import FRAME, Array, Frames
 from verlet_numba.frame import DIVERGED, OK
 from verlet_numba.run import checkpoint
 from verlet_numba.run.contents import contents, now, observables
-from verlet_numba.run.engine import State, run_chunk, start, warm
+from verlet_numba.run.engine import State, run_chunk, spread_over, start, warm
 from verlet_numba.run.lock import Lock
 from verlet_numba.run.postmortem import examine
 from verlet_numba.run.progress import Progress
@@ -55,7 +55,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
             if found.status in (COMPLETE, BROKEN):
                 checkpoint.remove(output)
                 return ended(output, found, prepared.scene)
-        run = Run(prepared, output, total, progress, found,
+        run = Run(prepared, output, total, threads, progress, found,
                   lambda: signals.stop() or (max_time is not None and time.perf_counter() - clock > max_time))
         try:
             with signals.prompt():
@@ -63,7 +63,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
         except Interrupted:
             run.summary.status = STOPPED
         else:
-            run.write(command, overwrite, threads)
+            run.write(command, overwrite)
     if run.summary.status == STOPPED:
         run.summary.signal = signals.number
     return run.summary
@@ -82,6 +82,7 @@ class Run:
     prepared: Prepared
     output: Path
     total: int
+    threads: int
     progress: Progress
     found: Found | None
     stop: Callable[[], bool]
@@ -106,6 +107,7 @@ class Run:
         self.summary.spend("build", time.perf_counter() - clock)
         require(self.output, self.bytes_to_write())
         self.tell_where()
+        spread_over(self.model, self.threads)
         self.compile_kernels()
         if last is not None:
             self.model.world = checkpoint.restored(self.model.world, last.arrays)
@@ -129,10 +131,10 @@ class Run:
         self.progress.compiled(self.summary.frames)
         self.summary.spend("compile", time.perf_counter() - clock)
 
-    def write(self, command: str, overwrite: bool, threads: int) -> None:
+    def write(self, command: str, overwrite: bool) -> None:
         """Simulate to the end, a divergence or a stop, and finish the file; without its end reached, keep a checkpoint."""
         with TrajectoryFile(self.output, contents(self.prepared, self.model, command), self.total, overwrite,
-                            resume_at=None if self.found is None else self.summary.frames, beside=threads > 1) as file:
+                            resume_at=None if self.found is None else self.summary.frames, beside=self.threads > 1) as file:
             if self.found is None:
                 checkpoint.remove(self.output)      # it belongs to a file that is no more, or will be replaced
             self.advance_all(file)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verlet_numba.run import checkpoint
+from verlet_numba.run.engine import spread_over
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +38,19 @@ def test_everything_comes_back(world, tmp_path):
         assert not np.shares_memory(a, b)
     size = (tmp_path / "a.vtkhdf.checkpoint").stat().st_size
     assert size - 20_000 < checkpoint.size(world) < size
+
+
+def test_the_number_of_threads_may_change(world, tmp_path, monkeypatch):
+    """Several have scratch of their own, which a run on one thread has not."""
+    monkeypatch.setattr("verlet_numba.run.engine.MANY", 0)
+    one, two = worlds.started(worlds.EVERYTHING), spread_over(worlds.started(worlds.EVERYTHING), 2)
+    assert one.world.effects.meet.beside is None
+    one.world.particles.position[:], two.world.particles.position[:] = 1, 2
+    for writer, reader, value in ((one, two, 1), (two, worlds.started(worlds.EVERYTHING), 2)):
+        write(tmp_path / "a", writer.world, 1)
+        found = checkpoint.restored(reader.world, checkpoint.newest(tmp_path / "a", 1).arrays)
+        assert (found.particles.position == value).all()
+        assert checkpoint.scalars(found) == checkpoint.scalars(reader.world)
 
 
 def test_the_origin_changes_with_any_array_or_number(world):
