@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import click
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 
 FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
 SCENE = click.argument("scene", type=click.Path(path_type=Path))

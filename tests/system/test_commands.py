@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 
 COMMANDS = ("run", "check", "plan", "schema", "warm", "render", "analyze", "compare", "verify")
 HEAVY = {"numba", "llvmlite", "scipy", "trimesh", "matplotlib", "h5py"}

@@ -3,9 +3,10 @@
 Metres, z up, particles in the order of the trajectory in every format, so that point n is particle n.
 """
 
+import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,7 +85,8 @@ def parts(trajectory: Trajectory) -> Iterator[Part]:
     of_triangle = owner[trajectory.triangles[:, 0]]
     of_line = [int(owner[line[0]]) for line in trajectory.lines]
     for number, body in enumerate(trajectory.bodies):
-        yield Part(body.name, body.first_particle, body.first_particle + body.particles, trajectory.triangles[of_triangle == number],
+        yield Part(body.name, body.first_particle, body.first_particle + body.particles,
+                   trajectory.triangles[of_triangle == number],
                    [line for line, of in zip(trajectory.lines, of_line, strict=True) if of == number],
                    trajectory.vertices[owner[trajectory.vertices] == number])
 
@@ -112,12 +114,9 @@ def write_ply(trajectory: Trajectory, positions: Array, frame: int, file: Path) 
     """Binary PLY: vertices with their body's number and colour, triangles, and lines as edges."""
     owner = owners(trajectory)
     kind = positions.dtype.newbyteorder("<")
-    vertex = np.zeros(len(positions), [("x", kind), ("y", kind), ("z", kind), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("body", "<i4")])
-    for k, axis in enumerate("xyz"):
-        vertex[axis] = positions[:, k]
-    colours = np.rint(255 * PALETTE[owner % len(PALETTE)]).astype(np.uint8)
-    vertex["red"], vertex["green"], vertex["blue"] = colours.T
-    vertex["body"] = owner
+    vertex = np.zeros(len(positions), [("position", kind, 3), ("colour", "u1", 3), ("body", "<i4")])
+    vertex["position"], vertex["body"] = positions, owner
+    vertex["colour"] = np.rint(255 * PALETTE[owner % len(PALETTE)])
     face = np.zeros(len(trajectory.triangles), [("count", "u1"), ("corners", "<i4", 3)])
     face["count"], face["corners"] = 3, trajectory.triangles
     edges = np.concatenate([np.zeros((0, 2), "<i4"), *(np.stack([line[:-1], line[1:]], 1) for line in trajectory.lines)])
@@ -142,9 +141,7 @@ def write_pc2(trajectory: Trajectory, frames: list[int], file: Path) -> None:
     if len(steps) > 1 or (len(steps) and steps[0] < 1):
         raise ExportError(f"{file}: PC2 holds frames at equal distances alone; choose FIRST:END:STEP")
     stride = int(steps[0]) if len(steps) else 1
-    header: Any = np.array([(b"POINTCACHE2\0", 1, trajectory.particles, frames[0], stride, len(frames))],
-                           [("magic", "S12"), ("version", "<i4"), ("points", "<i4"), ("start", "<f4"), ("rate", "<f4"), ("samples", "<i4")])
     with file.open("wb") as out:
-        out.write(header.tobytes())
+        out.write(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, trajectory.particles, frames[0], stride, len(frames)))
         for frame in frames:
             out.write(trajectory.positions(frame).astype("<f4").tobytes())

@@ -67,7 +67,7 @@ def write_mp4(pictures: Iterable[Any], clock: Floats, title: str, output: Path) 
     film = None
     try:
         for picture, times in zip(pictures, np.bincount(shown, minlength=len(clock)), strict=True):
-            width, height = picture.width // 2 * 2, picture.height // 2 * 2      # even, which colours at half the resolution ask for
+            width, height = picture.width // 2 * 2, picture.height // 2 * 2      # even, as half-size colours ask for
             if film is None:
                 film = write_frames(str(output), (width, height), fps=rate, codec="libx264", quality=None, macro_block_size=1,
                                     output_params=[*QUALITY, "-metadata", f"title={title}"])

@@ -52,7 +52,10 @@ def planes(words: Words) -> NDArray[np.uint8]:
 
 
 def block(arrays: dict[str, Array]) -> tuple[list[dict[str, Any]], bytes]:
-    """What stands where, and all arrays one after another, each from a multiple of 4 on, compressed; the same bytes for the same arrays."""
+    """What stands where, and all arrays one after another, each from a multiple of 4 on, compressed.
+
+    Equal arrays give equal bytes.
+    """
     listed, parts, place = [], [], 0
     for name, array in arrays.items():
         array = np.ascontiguousarray(array, np.dtype(array.dtype).newbyteorder("<"))

@@ -115,7 +115,7 @@ def owners(trajectory: Trajectory) -> Any:
 
 
 def radii(trajectory: Trajectory, scale: float) -> tuple[Floats, Floats]:
-    """(B,) m, how thick each body's lines and its dots are drawn: as the scene says, but no thinner than a small part of `scale`."""
+    """(B,) m, how thick each body's lines and its dots are drawn: as in the scene, but no thinner than a small part of `scale`."""
     entries = {entry.get("name"): entry for entry in trajectory.scene.get("bodies", ()) if isinstance(entry, dict)}
     told = [entries.get(body.name.split(".")[0], {}) for body in trajectory.bodies]     # copies are NAME.0, NAME.1 ...
     own = np.array([float(entry.get("radius") or 0.5 * (entry.get("thickness") or 0.0)) for entry in told])

@@ -121,7 +121,7 @@ def sample(moving: list[Moving], frame: int, positions: Array, velocities: Array
 
 def define_colliders(stage: Any, trajectory: Trajectory, view: View, frames: list[int]) -> None:
     """/world/colliders/NAME: boxes, spheres, cylinders and meshes, placed by a matrix, of those that move by one a frame."""
-    from pxr import Gf, UsdGeom, Vt
+    from pxr import Gf, Vt
 
     names = identifiers([entry.get("name") or f"{entry['kind']}_{k}" for k, entry in enumerate(view.colliders)])
     for name, collider, triangles in zip(names, view.colliders, view.solids, strict=True):

@@ -1,7 +1,8 @@
 """A trajectory as one page that plays by itself: no server, no request, no library; drawn by WebGL2 in `page/`.
 
 The page holds a header (JSON: names, colours, sizes, colliders) and one compressed block of arrays (`pack`), both as text
-that no script can be hidden in. Its content policy lets nothing in or out: no request, and no script but its own, known by its hash.
+that no script can be hidden in. Its content policy lets nothing in or out: no request, and no script but its own, which it
+knows by its hash.
 """
 
 import base64
@@ -72,7 +73,7 @@ def contents(trajectory: Trajectory, shown: list[int]) -> tuple[dict[str, Any], 
     camera = View(trajectory, 560, 420)
     words = quantised(trajectory, shown)
     line_radius, dot_radius = radii(trajectory, camera.scale)
-    listed = [name for name in measurable(trajectory, CHARTED)]
+    listed = measurable(trajectory, CHARTED)
     header = {
         "title": str(trajectory.scene.get("name") or trajectory.path.stem), "file": trajectory.path.name,
         "low": words.low.tolist(), "step": words.step.tolist(), "error": words.error,
@@ -80,7 +81,7 @@ def contents(trajectory: Trajectory, shown: list[int]) -> tuple[dict[str, Any], 
         "colliders": colliders(camera), "measures": {name: UNITS[name] for name in listed},
         "strain": strain_scale(trajectory, shown), "strain_error": strain_error(trajectory, words.error),
         "camera": {"eye": camera.camera.eye.tolist(), "centre": camera.centre.tolist(), "scale": camera.scale}}
-    arrays = {
+    arrays: dict[str, Array] = {
         "time": trajectory.time[shown].astype(np.float32),
         "position": pack.planes(pack.differences(words.words)),
         "triangles": trajectory.triangles.astype(np.uint32), "segments": segments(trajectory.lines),
@@ -156,7 +157,7 @@ def dots(trajectory: Trajectory) -> Array:
 
 
 def colliders(camera: View) -> list[dict[str, Any]]:
-    """Of every collider its colour and its flat sides, in its own axes: (origin, u, v, half sizes), unbounded where these are null."""
+    """Of every collider its colour and its flat sides, in its own axes; sides are unbounded where their half sizes are null."""
     return [{"kind": collider["kind"], "colour": COLLIDER, "sides": sides(collider)} for collider in camera.colliders]
 
 
