@@ -28,7 +28,7 @@ class Quantised(NamedTuple):
 def quantise(positions: Array, low: Array, high: Array) -> Words:
     """Positions (F, N, 3) between two corners (3,), m, as 16-bit words: rounded, so half a step off at most."""
     size = np.where(high > low, high - low, 1.0)
-    return np.rint((positions.astype(float) - low) * (LEVELS / size)).astype(np.uint16)
+    return np.rint((positions.astype(float) - low) / size * LEVELS).astype(np.uint16)
 
 
 def differences(words: Words) -> Words:

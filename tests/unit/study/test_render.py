@@ -87,7 +87,7 @@ def test_equal_input_gives_equal_pictures(path, tmp_path):
 
 
 @pytest.mark.parametrize(("output", "frames", "message"), [
-    ("a.mp4", None, "cannot write .mp4; use .png or .gif"), ("a", None, "without suffix; use .png or .gif"),
+    ("a.avi", None, "cannot write .avi; use .png, .gif, .mp4"), ("a", None, "without suffix; use .png, .gif, .mp4"),
     ("a.png", [12], "there is no frame 12: it has 12"), ("a.png", [-13], "there is no frame -13")])
 def test_what_cannot_be_drawn_is_refused_in_one_line(path, tmp_path, output, frames, message):
     with pytest.raises(RenderError, match=message):
