@@ -35,6 +35,7 @@ class Browser:
         wanted = {"browserName": "chrome", "goog:chromeOptions": {"binary": found(BROWSERS), "args": ARGUMENTS},
                   "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
         self.base += "/" + self._call("POST", "", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
+        self.resize(600, 340)
 
     def __enter__(self):
         return self
@@ -53,9 +54,13 @@ class Browser:
         with opener.open(request, timeout=120) as answer:
             return json.load(answer)["value"]
 
-    def open(self, url, width=640, height=480):
-        """Show a page in a window of this size, and wait until it has drawn something or told of trouble."""
-        self._call("POST", "/window/rect", {"width": width, "height": height})
+    def resize(self, width, height, mobile=False):
+        """Show so many pixels, of a phone or of a screen."""
+        self._call("POST", "/goog/cdp/execute", {"cmd": "Emulation.setDeviceMetricsOverride", "params": {
+            "width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile}})
+
+    def open(self, url):
+        """Load a page, and wait until it has drawn something or told of trouble."""
         self._call("POST", "/url", {"url": "about:blank"})
         self._call("POST", "/url", {"url": url})
         self.wait(lambda: self.state("frame") is not None or not self.script("return document.getElementById('trouble').hidden"))

@@ -15,11 +15,18 @@ class Player {
     Object.assign(this, { time: motion.start, playing: false, speed: 1, pending: false, before: null });
     this.tell();
     this.listen();
-    const asked = new URLSearchParams(location.hash.slice(1));         // such as #t=1.5&strain
-    element("strain").checked = asked.has("strain") && motion.header.strain > 0;
-    if (asked.has("t")) this.seek(Number(asked.get("t")) || 0);
-    else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play(true);
+    if (!this.address() && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play(true);
     this.redraw();
+  }
+
+  // What stands in the address, such as #t=1.5&strain: a time to stop at, colours by strain. Whether there is a time.
+  address() {
+    const asked = new URLSearchParams(location.hash.slice(1));
+    element("strain").checked = asked.has("strain") && this.motion.header.strain > 0;
+    if (!asked.has("t")) return false;
+    this.play(false);
+    this.seek(Number(asked.get("t")) || 0);
+    return true;
   }
 
   // What does not change.
@@ -72,6 +79,7 @@ class Player {
     chart.addEventListener("pointermove", press);
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("resize", () => this.redraw());
+    addEventListener("hashchange", () => this.address());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
     this.canvas.addEventListener("webglcontextlost", () => trouble("The graphics were taken away by the browser; reload the page."));
   }
