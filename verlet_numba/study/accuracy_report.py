@@ -174,7 +174,7 @@ def draw_work(study: Study, axes: Any) -> None:
     if dearest > 0.1 * REAL_TIME:                   # further away it would leave the rest no room
         axes.axvline(REAL_TIME, color="grey", linewidth=0.8, label="real time")
     axes.set(xlabel="processor seconds a simulated second", ylabel=f"error [{study.unit}]",
-             title="error; numbers are substeps a frame" + ("" if dearest > 0.1 * REAL_TIME else ", all much faster than real time"))
+             title="error; numbers are substeps a frame" + ("" if dearest > 0.1 * REAL_TIME else ", all far below real time"))
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.grid(True, which="both", linewidth=0.2)
     annotate(axes, told)

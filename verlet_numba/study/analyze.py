@@ -17,7 +17,7 @@ __all__ = ["PICTURES", "Analysis", "MeasureError", "analyze", "plot", "table", "
 
 LOGARITHMIC = ("constraint_error_max", "constraint_error_rms", "penetration_max", "speed_max")
 PICTURES = (".png", ".svg", ".pdf")
-STROKES = ("-", "--", ":")      # of the axes
+STROKES: tuple[Any, ...] = ("-", "--", ":")     # of the axes
 DECADES = 6                     # of a logarithmic axis, at most: errors of rounding alone are below
 LISTED, LONGEST, WIDE = 12, 44, 150     # files in a legend, letters of a name and of the legend's lines, at most
 
