@@ -154,11 +154,11 @@ def solid(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
             half = 0.5 * np.array(collider["size"], float)
             sides = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
             frames = np.eye(3)
-            return np.concatenate([
+            return outward(np.concatenate([
                 grid(half * (sign * frames[axis] - frames[axis - 1] - frames[axis - 2]), 2 * half * frames[axis - 1],
-                     2 * half * frames[axis - 2], 4).reshape(-1, 3, 3) for axis, sign in sides])
+                     2 * half * frames[axis - 2], 4).reshape(-1, 3, 3) for axis, sign in sides]))
         case "sphere":
-            return float(collider["radius"]) * ball(4)
+            return outward(float(collider["radius"]) * ball(4))
         case "cylinder":
             axis = np.array(collider.get("axis", (0, 0, 1)), float)
             end = (0.5 * collider["length"] * axis / np.linalg.norm(axis))[None]
@@ -166,10 +166,17 @@ def solid(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
             rim = tube[:72]     # corners: start, end, next end
             lids = [np.stack([rim[:, corner], np.roll(rim[:, corner], -1, axis=0), np.broadcast_to(lid, (72, 3))], 1)
                     for corner, lid in ((0, -end), (1, end))]
-            return np.concatenate([tube, *lids])
+            return outward(np.concatenate([tube, *lids]))
         case "mesh":
             return _mesh(collider, folders)
     return np.zeros((0, 3, 3))
+
+
+def outward(triangles: Floats) -> Floats:
+    """Triangles (M, 3, 3) of a convex solid about the origin, counter-clockwise seen from outside."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    inside_out = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0
+    return np.where(inside_out[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _mesh(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:

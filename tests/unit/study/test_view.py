@@ -95,23 +95,73 @@ def test_a_page_holds_the_trajectory(trajectory, tmp_path):
     assert found["corners 1"].max() == len(found["points 1"]) - 1
 
 
-@pytest.mark.skipif(not shutil.which("node"), reason="needs node")
-def test_the_pages_script_decodes_the_same(trajectory, tmp_path):
-    view(trajectory, tmp_path / "a.html")
-    page = (tmp_path / "a.html").read_text(encoding="utf-8")
-    (tmp_path / "header.json").write_text(re.search(r'id="header">(.*?)</script>', page, re.DOTALL)[1], encoding="utf-8")
-    (tmp_path / "data.txt").write_text(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1], encoding="utf-8")
-    decode = files("verlet_numba.study").joinpath("page/decode.js").read_text(encoding="utf-8")
-    (tmp_path / "check.js").write_text(decode + """
+CHECK = """
 const fs = require("fs"), header = JSON.parse(fs.readFileSync("header.json", "utf8"));
 unpack(fs.readFileSync("data.txt", "utf8"), header.arrays).then((arrays) => {
-  const words = wholeSteps(arrays.position, header.frames, 37);
-  process.stdout.write(JSON.stringify({ words: [...words], triangles: [...arrays.triangles], time: [...arrays.time] }));
-});""", encoding="utf-8")
-    told = json.loads(subprocess.run(["node", "check.js"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout)
+  const motion = new Motion(header, arrays), mesh = creased(arrays["points 2"], arrays["corners 2"]);
+  motion.seek(10.25 / 60, true);
+  const told = { words: motion.words, triangles: arrays.triangles, positions: motion.positions, normals: motion.normals,
+    strains: motion.strains, pose: motion.pose(1, 10.25 / 60), places: mesh.positions, across: mesh.normals };
+  process.stdout.write(JSON.stringify(Object.fromEntries(Object.entries(told).map(([name, values]) => [name, [...values]]))));
+});"""
+
+
+@pytest.fixture(scope="module")
+def scripted(trajectory, tmp_path_factory):
+    """A page, and what its own scripts make of it in node."""
+    if not shutil.which("node"):
+        pytest.skip("needs node")
+    folder = tmp_path_factory.mktemp("node")
+    view(trajectory, folder / "a.html")
+    page = (folder / "a.html").read_text(encoding="utf-8")
+    (folder / "header.json").write_text(re.search(r'id="header">(.*?)</script>', page, re.DOTALL)[1], encoding="utf-8")
+    (folder / "data.txt").write_text(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1], encoding="utf-8")
+    own = files("verlet_numba.study").joinpath("page")
+    scripts = [own.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in ("decode", "matrix", "motion")]
+    (folder / "check.js").write_text("\n".join([*scripts, CHECK]), encoding="utf-8")
+    told = subprocess.run(["node", "check.js"], cwd=folder, capture_output=True, text=True, check=True).stdout
+    return page, {name: np.array(values) for name, values in json.loads(told).items()}
+
+
+def test_the_pages_script_decodes_the_same(scripted):
+    page, told = scripted
     _, found = unpacked(page)
-    np.testing.assert_array_equal(np.reshape(told["words"], (31, 3, 37)).transpose(0, 2, 1), whole(found["position"]))
-    assert told["triangles"] == found["triangles"].ravel().tolist()
+    np.testing.assert_array_equal(told["words"].reshape(31, 3, 37).transpose(0, 2, 1), whole(found["position"]))
+    np.testing.assert_array_equal(told["triangles"], found["triangles"].ravel())
+
+
+def test_the_pages_script_moves_bodies_as_the_trajectory_does(scripted, trajectory):
+    """A quarter of the way from frame 10 to 11: positions, normals of the sheet, strain, the pose of a spinning box."""
+    _, told = scripted
+    with reader.open(trajectory) as run:
+        before, after = run.positions([10, 11]).astype(float)
+        pairs, lengths, triangles = run.pairs, run.lengths, run.body("sheet").triangles
+    expected = before + 0.25 * (after - before)
+    positions = told["positions"].reshape(-1, 3)
+    np.testing.assert_allclose(positions, expected, atol=1e-4)
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    normals = np.zeros((37, 3))
+    for k in range(3):
+        np.add.at(normals, triangles[:, k], np.cross(b - a, c - a))
+    np.testing.assert_allclose(told["normals"].reshape(-1, 3), normals, atol=1e-6)
+    strain = np.linalg.norm(positions[pairs[:, 0]] - positions[pairs[:, 1]], axis=1) / lengths - 1
+    for particle in (0, 5, 14, 36):
+        own = strain[(pairs == particle).any(axis=1)]
+        assert told["strains"][particle] == pytest.approx(own[np.argmax(np.abs(own))] if len(own) else 0, abs=1e-5)
+    angle = 2.0 * 10.25 / 60
+    np.testing.assert_allclose(told["pose"].reshape(4, 4).T, [
+        [np.cos(angle), -np.sin(angle), 0, 1], [np.sin(angle), np.cos(angle), 0, 1], [0, 0, 1, 0.2], [0, 0, 0, 1]], atol=1e-4)
+
+
+def test_a_cylinder_is_round_along_its_side_and_sharp_at_its_rims(scripted):
+    _, told = scripted
+    places, across = told["places"].reshape(-1, 3), told["across"].reshape(-1, 3)
+    lids = np.abs(across[:, 1]) > 0.5
+    np.testing.assert_allclose(np.abs(across[lids]), np.broadcast_to([0, 1, 0], (lids.sum(), 3)), atol=1e-6)
+    radial = places[~lids] * [1, 0, 1]
+    np.testing.assert_allclose(across[~lids], radial / np.linalg.norm(radial, axis=1, keepdims=True), atol=0.05)
+    assert lids.sum() == 2 * 3 * 72
+    assert (across[lids] * places[lids]).sum(axis=1).min() > 0
 
 
 @pytest.mark.skipif(not shutil.which("node"), reason="needs node")

@@ -1,7 +1,8 @@
 // From the page's text to numbers: base64, gzip, then whole steps from differences (the other way round: study/pack.py).
 
 async function unpack(text, listed) {
-  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const letters = atob(text.trim()), bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = letters.charCodeAt(i);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
   const kinds = { f4: Float32Array, u4: Uint32Array, u1: Uint8Array };

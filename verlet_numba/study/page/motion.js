@@ -49,8 +49,8 @@ class Motion {
     for (let axis = 0; axis < 3; axis++) {
       const first = (3 * a + axis) * n, second = (3 * b + axis) * n;
       for (let i = 0; i < n; i++) {
-        const [x, y] = [this.words[first + i], this.words[second + i]];
-        this.positions[3 * i + axis] = low[axis] + step[axis] * (x + part * (y - x));
+        const x = this.words[first + i];
+        this.positions[3 * i + axis] = low[axis] + step[axis] * (x + part * (this.words[second + i] - x));
       }
     }
     this.turnNormals();
@@ -62,7 +62,7 @@ class Motion {
     const { positions: p, normals, sheets } = this;
     normals.fill(0);
     for (let k = 0; k < sheets.length; k += 3) {
-      const [a, b, c] = [3 * sheets[k], 3 * sheets[k + 1], 3 * sheets[k + 2]];
+      const a = 3 * sheets[k], b = 3 * sheets[k + 1], c = 3 * sheets[k + 2];
       const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
       const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
       const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
@@ -80,7 +80,7 @@ class Motion {
     strains.fill(0);
     for (let k = 0; k < lengths.length; k++) {
       if (!(lengths[k] > 0)) continue;
-      const [i, j] = [pairs[2 * k], pairs[2 * k + 1]];
+      const i = pairs[2 * k], j = pairs[2 * k + 1];
       const long = Math.hypot(p[3 * i] - p[3 * j], p[3 * i + 1] - p[3 * j + 1], p[3 * i + 2] - p[3 * j + 2]);
       const strain = long / lengths[k] - 1;
       if (Math.abs(strain) > Math.abs(strains[i])) strains[i] = strain;
