@@ -35,7 +35,7 @@ class Browser:
         wanted = {"browserName": "chrome", "goog:chromeOptions": {"binary": found(BROWSERS), "args": ARGUMENTS},
                   "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
         self.base += "/" + self._call("POST", "", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]
-        self.resize(600, 340)
+        self.resize(640, 360)
 
     def __enter__(self):
         return self

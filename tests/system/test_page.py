@@ -122,7 +122,7 @@ def test_two_fingers_zoom_on_a_phone(window, page):
     window.drag([(180, 250), (150, 250), (100, 250)], [(220, 250), (250, 250), (300, 250)], kind="touch")
     window.wait(lambda: difference(first, window.picture()) > 0.02)
     assert window.script("return document.documentElement.scrollWidth <= innerWidth")
-    window.resize(600, 340)
+    window.resize(640, 360)
 
 
 def test_strain_is_a_switch(window, page):

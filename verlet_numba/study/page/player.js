@@ -46,7 +46,7 @@ class Player {
     }
     if (names.size > LISTED) element("bodies").append(`and ${names.size - LISTED} more`);
     for (const speed of SPEEDS) element("speed").append(new Option(`${speed} ×`, speed, speed === 1, speed === 1));
-    element("strain-switch").hidden = !header.strain;
+    element("strain-switch").hidden = element("strain").disabled = !header.strain;
     element("scale-low").textContent = `−${short(100 * header.strain)} %`;
     element("scale-high").textContent = `${short(100 * header.strain)} %`;
     element("chart").hidden = !this.chart.rows.length;
@@ -79,7 +79,10 @@ class Player {
     chart.addEventListener("pointermove", press);
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("resize", () => this.redraw());
-    addEventListener("hashchange", () => this.address());
+    addEventListener("hashchange", () => {
+      this.address();
+      this.redraw();
+    });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
     this.canvas.addEventListener("webglcontextlost", () => trouble("The graphics were taken away by the browser; reload the page."));
   }
