@@ -13,12 +13,14 @@ from typing import Any, NoReturn
 
 import click
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 
 FAILED, WRONG, DIVERGED, OUT_OF_TIME, INTERRUPTED, TERMINATED = 1, 2, 3, 5, 130, 143
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+TRAJECTORY = click.argument("trajectory", type=click.Path(path_type=Path))
+FRAMES = click.option("--frames", help="Frames to take: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings, no summary.")
 VERBOSE = click.option("-v", "--verbose", is_flag=True, help="Say more about what is done.")
@@ -175,9 +177,9 @@ def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
 
 
 @cli.command()
-@click.argument("trajectory", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="A .png contact sheet or a .gif.")
-@click.option("--frames", help="Frames to show: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
+@TRAJECTORY
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="A .png contact sheet, a .gif or a .mp4.")
+@FRAMES
 @OVERWRITE
 def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) -> None:
     """Draw TRAJECTORY without a display: a sheet of pictures or an animation."""
@@ -189,6 +191,52 @@ def render(trajectory: Path, output: Path, frames: str | None, overwrite: bool) 
         draw(trajectory, output, frames=chosen(frames))
     except RenderError as error:
         raise Misuse(str(error)) from error
+
+
+@cli.command()
+@TRAJECTORY
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="The page, a .html.")
+@FRAMES
+@click.option("--budget", type=click.FloatRange(0, min_open=True), default=24.0, show_default=True,
+              help="MB of positions before compression, at most: frames are thinned evenly to fit.")
+@OVERWRITE
+@QUIET
+def view(trajectory: Path, output: Path, frames: str | None, budget: float, overwrite: bool, quiet: bool) -> None:
+    """Make one page that plays TRAJECTORY in a browser, by itself and offline."""
+    refuse_existing(output, overwrite)
+    from verlet_numba.study.render import RenderError
+    from verlet_numba.study.view import view as make_page
+
+    try:
+        page = make_page(trajectory, output, chosen(frames), 1e6 * budget)
+    except RenderError as error:
+        raise Misuse(str(error)) from error
+    if page.every > 1 and not quiet:
+        say(f"{output}: {page.of} frames are more than {budget:g} MB of positions, so every {page.every}. is shown; "
+            "choose others with --frames, or allow more with --budget")
+    if not quiet:
+        click.echo(f"{output}: {page.frames} frames, {page.size / 1e6:.2f} MB, positions within {page.error:.2g} m")
+
+
+@cli.command()
+@TRAJECTORY
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True,
+              help="A .usdc, .usda or .pc2 with all frames; a .obj or .ply is one of a numbered sequence.")
+@FRAMES
+@OVERWRITE
+@QUIET
+def export(trajectory: Path, output: Path, frames: str | None, overwrite: bool, quiet: bool) -> None:
+    """Write TRAJECTORY, or frames of it, in another format: USD, PC2, or a sequence of OBJ or PLY files."""
+    refuse_existing(output, overwrite)
+    from verlet_numba.study.export import ExportError
+    from verlet_numba.study.export import export as write
+
+    try:
+        written = write(trajectory, output, chosen(frames), overwrite)
+    except ExportError as error:
+        raise Misuse(str(error)) from error
+    if not quiet:
+        click.echo(f"{written[0]}: written" if len(written) == 1 else f"{written[0]} to {written[-1]}: {len(written)} files")
 
 
 @cli.command()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 from verlet_numba.buffers import (
     ANGULAR,
     CENTRE,

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 from verlet_numba.run.vtkhdf import create_vtkhdf, write_static
 
 FORMAT = 1                          # version of the file format

@@ -12,7 +12,7 @@ import yaml
 from verlet_numba.study.accuracy import HOLLOW, Point, Study, words
 
 REAL_TIME = 1.0         # s a simulated second
-SHOWN = ("constraint_error_max", "constraint_error_rms", "penetration_max", "energy_gain")
+MEANINGS = {"constraint_error_rms": "strain, rms over sticks and time", "penetration_max": "deepest penetration [m]"}
 
 
 def table(study: Study) -> Iterator[str]:
@@ -154,6 +154,7 @@ def families(study: Study) -> dict[str, list[Point]]:
 
 def draw_work(study: Study, axes: Any) -> None:
     """Error against seconds a simulated second; hollow where the reference is not known well enough; slopes 1 and 2."""
+    told: list[tuple[str, tuple[float, float]]] = []
     for number, (name, points) in enumerate(families(study).items()):
         costs, errors = [point.cost for point in points], [max(point.error, 1e-16) for point in points]
         colour = f"C{number % 10}"
@@ -161,8 +162,7 @@ def draw_work(study: Study, axes: Any) -> None:
         axes.loglog([], [], "o-", color=colour, label=name)
         for point, cost, error in zip(points, costs, errors, strict=True):
             axes.loglog([cost], [error], "o", color=colour, fillstyle="none" if point.hollow else "full")
-            axes.annotate(str(point.settings.get("solver.substeps", "")), (cost, error), fontsize=6, xytext=(3, 3),
-                          textcoords="offset points")
+            told.append((str(point.settings.get("solver.substeps", "")), (cost, error)))
     front = sorted((point for point in study.points if point.front), key=lambda point: point.cost)
     axes.step([point.cost for point in front], [max(point.error, 1e-16) for point in front], where="post", color="black",
               linewidth=2.5, alpha=0.3, label="Pareto front")
@@ -170,11 +170,24 @@ def draw_work(study: Study, axes: Any) -> None:
         guides(axes, front[0].cost, max(front[0].error, 1e-16), max(point.cost for point in study.points if point.sound))
     if study.bar:
         axes.axhline(study.bar, color="grey", linestyle=":", label="error bar of the reference")
-    axes.axvline(REAL_TIME, color="grey", linewidth=0.8)
+    dearest = max((point.cost for point in study.points if point.sound), default=REAL_TIME)
+    if dearest > 0.1 * REAL_TIME:                   # further away it would leave the rest no room
+        axes.axvline(REAL_TIME, color="grey", linewidth=0.8, label="real time")
     axes.set(xlabel="processor seconds a simulated second", ylabel=f"error [{study.unit}]",
-             title="error; numbers are substeps a frame, the line at 1 is real time")
-    axes.legend(fontsize=7)
+             title="error; numbers are substeps a frame" + ("" if dearest > 0.1 * REAL_TIME else ", all far below real time"))
+    axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.grid(True, which="both", linewidth=0.2)
+    annotate(axes, told)
+
+
+def annotate(axes: Any, told: list[tuple[str, tuple[float, float]]]) -> None:
+    """Words at places, but for those that would stand on another."""
+    taken: list[Any] = []
+    for word, place in told:
+        spot = axes.transData.transform(place)
+        if all(abs(spot[0] - other[0]) > 14 or abs(spot[1] - other[1]) > 9 for other in taken):       # pixels
+            axes.annotate(word, place, fontsize=6, xytext=(3, 3), textcoords="offset points")
+            taken.append(spot)
 
 
 def guides(axes: Any, cost: float, error: float, dearest: float) -> None:
@@ -187,16 +200,19 @@ def guides(axes: Any, cost: float, error: float, dearest: float) -> None:
 
 def draw_strain(study: Study, axes: Any) -> None:
     """Strain and penetration against cost: what holds of the scene as a whole, past its horizon too."""
+    drawn: dict[str, str] = {}
     for number, points in enumerate(families(study).values()):
         costs = [point.cost for point in points]
         for measure, style in (("constraint_error_rms", "o-"), ("penetration_max", "s:")):
             values = [point.statistics()[measure][0] for point in points]
             if max(values) > 0.0:
                 axes.loglog(costs, values, style, color=f"C{number % 10}", markersize=4, linewidth=0.8)
-    axes.loglog([], [], "ko-", label="strain, rms over sticks and time")
-    axes.loglog([], [], "ks:", label="deepest penetration [m]")
+                drawn[style] = measure
+    for style, measure in drawn.items():
+        axes.loglog([], [], f"k{style}", label=MEANINGS[measure])
     axes.set(xlabel="processor seconds a simulated second", title="constraints and contacts")
-    axes.legend(fontsize=7)
+    if drawn:
+        axes.legend(fontsize=7)
     axes.grid(True, which="both", linewidth=0.2)
 
 
@@ -214,6 +230,9 @@ def draw_passes(study: Study, axes: Any) -> None:
     axes.set(xlabel="passes a substep", ylabel="strain, rms", title="residual against passes")
     if axes.lines:
         axes.legend(fontsize=7)
+        passes = sorted({count for values in found.values() if len(values) > 1 for count, _ in values})
+        axes.set_xticks(passes, [str(count) for count in passes])
+        axes.set_xticks([], minor=True)
     axes.grid(True, which="both", linewidth=0.2)
 
 
@@ -224,6 +243,8 @@ def draw_effects(study: Study, axes: Any) -> None:
     axes.barh(names, saved)
     for place, point in enumerate(study.effects.values()):
         axes.annotate(f" changes {point.error:.2g} m", (max(saved[place], 0), place), va="center", fontsize=8)
+    low, high = min([0.0, *saved]), max([0.0, *saved])
+    axes.set_xlim(low - 0.05 * (high - low), high + 0.5 * (high - low) + 1e-3)         # room for the words
     axes.axvline(0, color="grey", linewidth=0.8)
     axes.set(xlabel="saved by leaving it out [% of the time]", title="what each effect costs and changes")
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.study import reader
-from verlet_numba.study.measures import COLLIDERS, POSITIONS, UNITS, USUAL, MeasureError, measurable, measure, source
+from verlet_numba.study.measures import COLLIDERS, POSITIONS, UNITS, USUAL, VECTORS, MeasureError, measurable, measure, source
 from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
 
 AXES = "xyz"
@@ -17,6 +17,9 @@ __all__ = ["PICTURES", "Analysis", "MeasureError", "analyze", "plot", "table", "
 
 LOGARITHMIC = ("constraint_error_max", "constraint_error_rms", "penetration_max", "speed_max")
 PICTURES = (".png", ".svg", ".pdf")
+STROKES: tuple[Any, ...] = ("-", "--", ":")     # of the axes
+DECADES = 6                     # of a logarithmic axis, at most: errors of rounding alone are below
+LISTED, LONGEST, WIDE = 12, 44, 150     # files in a legend, letters of a name and of the legend's lines, at most
 
 
 class Analysis(NamedTuple):
@@ -145,32 +148,77 @@ def plot(analyses: Sequence[Analysis], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    courses = {name: None for analysis in analyses for name, values in analysis.values.items() if values.ndim and values.any()}
-    names = list(courses)
+    names = list({name: None for analysis in analyses for name, values in analysis.values.items() if values.ndim and values.any()})
     columns = min(3, max(1, len(names)))
     rows = max(1, -(-len(names) // columns))
-    figure = Figure(figsize=(4.2 * columns, 2.5 * rows + 0.5), layout="constrained")
+    figure = Figure(figsize=(4.2 * columns, 2.5 * rows + 1.0), layout="constrained")
     FigureCanvasAgg(figure)
+    hues = colours(len(analyses))
     for place, name in enumerate(names):
         axes = figure.add_subplot(rows, columns, place + 1)
-        for colour, analysis in enumerate(analyses):
-            if name in analysis.values:
-                draw(axes, analysis.time, analysis.values[name], f"C{colour}", analysis.file)
-        logarithmic = name in LOGARITHMIC and any((analysis.values.get(name, np.zeros(1)) > 0).any() for analysis in analyses)
-        axes.set_yscale("log" if logarithmic else "linear")
-        axes.set_title(name.replace("_", " ") + (f"  [{UNITS[name]}]" if UNITS[name] else ""), fontsize=9)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.3)
-        axes.margins(x=0)
+        course(axes, name, analyses, hues)
         if place >= len(names) - columns:
             axes.set_xlabel("time [s]", fontsize=8)
     if names:
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", fontsize=8, ncols=min(3, len(labels)))
+        legend(figure, short_names([analysis.file for analysis in analyses]), hues, vectors=any(name in VECTORS for name in names))
     figure.savefig(path, dpi=110)
 
 
-def draw(axes: Any, time: Array, values: Array, colour: str, label: str) -> None:
-    """One curve, or three of a vector, of one colour."""
-    for k, curve in enumerate(values.reshape(len(time), -1).T):
-        axes.plot(time, curve, ("-", "--", ":")[k], color=colour, linewidth=1.2, label=label if k == 0 else None)
+def course(axes: Any, name: str, analyses: Sequence[Analysis], hues: list[Any]) -> None:
+    """One measure of all files. Where small values matter it is drawn by its logarithm, what is rounding alone at the floor."""
+    found = [(analysis.time, analysis.values[name], hue) for analysis, hue in zip(analyses, hues, strict=True)
+             if name in analysis.values]
+    floor = log_floor([values for _, values, _ in found]) if name in LOGARITHMIC else 0.0
+    for time, values, hue in found:
+        for k, curve in enumerate(values.reshape(len(time), -1).T):
+            axes.plot(time, np.maximum(curve, floor) if floor else curve, STROKES[k], color=hue, linewidth=1.2)
+    if floor:
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=floor)
+    axes.set_title(name.replace("_", " ") + (f"  [{UNITS[name]}]" if UNITS[name] else ""), fontsize=9)
+    axes.tick_params(which="both", labelsize=7)
+    axes.yaxis.get_offset_text().set_fontsize(7)
+    axes.grid(alpha=0.3)
+    axes.margins(x=0)
+
+
+def log_floor(courses: Sequence[Array]) -> float:
+    """Where a logarithmic axis ends: the least that is not 0, but no less than DECADES below the largest; 0 where an axis without
+    logarithm shows as much, all being within a decade."""
+    numbers = np.concatenate([values[np.isfinite(values) & (values > 0)] for values in courses])
+    if not numbers.size:
+        return 0.0
+    floor = max(float(numbers.min()), float(numbers.max()) * 10.0**-DECADES)
+    return floor if numbers.max() > 10 * floor else 0.0
+
+
+def legend(figure: Any, names: list[str], hues: list[Any], vectors: bool) -> None:
+    """Colours of files above all panels, and below which stroke is which axis."""
+    from matplotlib.lines import Line2D
+
+    told = [(Line2D([], [], color=hue), name) for name, hue in zip(names[:LISTED], hues, strict=False)]
+    if len(names) > LISTED:
+        told.append((Line2D([], [], alpha=0), f"and {len(names) - LISTED} more"))
+    wide = max(len(name) for _, name in told) + 8       # letters, with the stroke before the name
+    figure.legend(*zip(*told, strict=True), loc="outside upper center", fontsize=8, ncols=max(1, min(len(told), WIDE // wide)))
+    if vectors:
+        strokes = [Line2D([], [], color="grey", linestyle=stroke) for stroke in STROKES]
+        figure.legend(strokes, [f"{axis} of a vector" for axis in AXES], loc="outside lower center", fontsize=8, ncols=len(AXES))
+
+
+def colours(count: int) -> list[Any]:
+    """As many colours that differ: the usual ten, or of more a scale."""
+    from matplotlib import colormaps
+
+    return [f"C{k}" for k in range(count)] if count <= 10 else list(colormaps["viridis"](np.linspace(0, 0.95, count)))
+
+
+def short_names(files: Sequence[str]) -> list[str]:
+    """The shortest ends of paths that tell files apart, without suffix; what is still long is cut in its middle."""
+    paths = [Path(file).with_suffix("").parts for file in files]
+    found = []
+    for own in paths:
+        length = next((k for k in range(1, len(own)) if sum(other[-k:] == own[-k:] for other in paths) == 1), len(own))
+        name = "/".join(own[-length:])
+        found.append(name if len(name) <= LONGEST else f"{name[:LONGEST // 2 - 1]}…{name[-LONGEST // 2:]}")
+    return found

@@ -4,11 +4,14 @@ import json
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = NDArray[Any]
 Frames = int | slice | list[int] | NDArray[np.int64]
@@ -71,13 +74,13 @@ class Trajectory:
         """(T,) number of the substep."""
         return self._read("particles/trajectory/step", slice(self.frames))
 
-    def positions(self, frames: Frames = ALL) -> Array:
+    def positions(self, frames: Frames = ALL, particles: slice = ALL) -> Array:
         """(k, N, 3) m, or (N, 3) for one frame; frames are counted as in a list, -1 is the last committed."""
-        return self._field("position", frames)
+        return self._field("position", frames, particles)
 
-    def velocities(self, frames: Frames = ALL) -> Array | None:
+    def velocities(self, frames: Frames = ALL, particles: slice = ALL) -> Array | None:
         """Like `positions`, m/s; None in a file without them."""
-        return self._field("velocity", frames) if "velocity" in self._names("particles/trajectory") else None
+        return self._field("velocity", frames, particles) if "velocity" in self._names("particles/trajectory") else None
 
     @cached_property
     def bodies(self) -> list[Body]:
@@ -137,15 +140,30 @@ class Trajectory:
             raise TrajectoryError(f"{self.path}: damaged: /provenance/scene is no JSON object")
         return scene
 
-    def _field(self, name: str, frames: Frames) -> Array:
+    def body(self, name: str) -> "BodyView":
+        """A body alone, of several copies the copy NAME.K. Raises TrajectoryError if there is none of that name."""
+        for body in self.bodies:
+            if body.name == name:
+                return BodyView(self, body)
+        known = ", ".join(body.name for body in self.bodies[:10]) + (" ..." if len(self.bodies) > 10 else "")
+        raise TrajectoryError(f"{self.path}: there is no body {name!r}; there are {known or 'none'}")
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Positions, velocities and observables with labels, as an xarray.Dataset that reads what is asked of it, while this file
+        is open. Raises ImportError without xarray."""
+        from verlet_numba.study.labelled import dataset
+
+        return dataset(self)
+
+    def _field(self, name: str, frames: Frames, particles: slice = ALL) -> Array:
         numbers = np.arange(self.frames)[frames]        # IndexError for a frame that is not there
         path = f"particles/trajectory/{name}/value"
         if np.ndim(numbers) == 0:
-            return self._read(path, int(numbers))
+            return self._read(path, (int(numbers), particles))
         if isinstance(frames, slice) and len(numbers) and (frames.step or 1) > 0:
-            return self._read(path, slice(int(numbers[0]), int(numbers[-1]) + 1, frames.step))
+            return self._read(path, (slice(int(numbers[0]), int(numbers[-1]) + 1, frames.step), particles))
         unique, places = np.unique(numbers, return_inverse=True)
-        return self._read(path, unique)[places]
+        return self._read(path, (unique, particles))[places]
 
     def _item(self, path: str) -> Any:
         try:
@@ -177,6 +195,53 @@ class Trajectory:
             return self._item(path).attrs[name]
         except (KeyError, OSError, RuntimeError, AttributeError) as error:
             raise TrajectoryError(f"{self.path}: no trajectory, or damaged: /{path} lacks {name}") from error
+
+
+class BodyView:
+    """A body of an open trajectory: its particles are numbered from 0. Arrays are read when they are asked for."""
+
+    def __init__(self, trajectory: Trajectory, body: Body) -> None:
+        self._trajectory, self._body = trajectory, body
+        self.name, self.kind, self.mass = body.name, body.kind, body.mass      # mass: kg
+        self._own = slice(body.first_particle, body.first_particle + body.particles)
+
+    def __len__(self) -> int:
+        """The number of its particles."""
+        return self._body.particles
+
+    def positions(self, frames: Frames = ALL) -> Array:
+        """(k, n, 3) m, or (n, 3) for one frame."""
+        return self._trajectory.positions(frames, self._own)
+
+    def velocities(self, frames: Frames = ALL) -> Array | None:
+        """Like `positions`, m/s; None in a file without them."""
+        return self._trajectory.velocities(frames, self._own)
+
+    @cached_property
+    def triangles(self) -> NDArray[np.int64]:
+        """(F, 3) particles, counter-clockwise seen from outside (cloth: from the side of its normal)."""
+        faces = slice(self._body.first_face, self._body.first_face + self._body.faces)
+        return self._trajectory.triangles[faces] - self._own.start
+
+    @cached_property
+    def lines(self) -> list[NDArray[np.int64]]:
+        """Polylines, each its particles."""
+        return [line - self._own.start for line in self._trajectory.lines if self._own.start <= line[0] < self._own.stop]
+
+    @cached_property
+    def pairs(self) -> NDArray[np.int64]:
+        """(C, 2) particles of its distance constraints."""
+        return self._trajectory.pairs[self._constraints].astype(np.int64) - self._own.start
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """(C,) m, rest lengths of the pairs."""
+        return self._trajectory.lengths[self._constraints]
+
+    @cached_property
+    def _constraints(self) -> NDArray[np.bool_]:
+        pairs = self._trajectory.pairs
+        return np.asarray(((pairs >= self._own.start) & (pairs < self._own.stop)).all(axis=1))
 
 
 def open(path: str | Path) -> Trajectory:

@@ -1,4 +1,4 @@
-"""Pictures of a trajectory without a display: a sheet of frames (PNG) or a moving one (GIF)."""
+"""Pictures of a trajectory without a display: a sheet of frames (PNG) or a moving one (GIF, MP4)."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verlet_numba.study import reader
+from verlet_numba.study import moving, reader
 from verlet_numba.study.camera import NOTHING, Camera, Floats, frame_points, visible
 from verlet_numba.study.reader import Trajectory
 from verlet_numba.study.surfaces import COLLIDER, Surface, body_surfaces, ground, placed, room, solid, surface
@@ -17,7 +17,7 @@ LIGHT = np.array([-0.24, -0.54, 0.81])      # towards it: above, from the left a
 FINE = 2                # pixels a side that make one of the picture
 SHADOW_DEPTH = 0.38
 SOFT = 2.5              # pixels, the blur of a shadow's edge
-SHEET_FRAMES, GIF_FRAMES = 6, 120
+MOST = {".png": 6, ".gif": 120, ".mp4": 240}        # frames of a picture, by its suffix, unless they are chosen
 FRAMED = 60             # frames the camera is fitted to
 INK = (40, 44, 52)
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])      # of a cube
@@ -31,28 +31,37 @@ def render(path: str | Path, output: str | Path, frames: Sequence[int | slice] |
            height: int = 420) -> list[int]:
     """Draw frames of a trajectory to `output` and return which.
 
-    A .png shows all of them side by side, six by default, evenly spread; a .gif one after another, by default all or
-    120 evenly spread, at their own pace (50 a second at most). `width` and `height` are those of one frame, pixels.
-    Raises RenderError for another suffix or a frame that does not exist, TrajectoryError for an unreadable file,
-    OSError for an output that cannot be written.
+    A .png shows all of them side by side, six by default, evenly spread; a .gif or .mp4 one after another at their own
+    pace, by default all or the most of MOST, evenly spread; what comes too fast after another for the format is left out.
+    `width` and `height` are those of one frame, pixels. Raises RenderError for another suffix, a frame that does not
+    exist or a missing package, TrajectoryError for an unreadable file, OSError for an output that cannot be written.
     """
     output = Path(output)
-    if output.suffix.lower() not in (".png", ".gif"):
-        raise RenderError(f"{output}: cannot write {output.suffix or 'a file without suffix'}; use .png or .gif")
+    suffix = output.suffix.lower()
+    if suffix not in MOST:
+        raise RenderError(f"{output}: cannot write {suffix or 'a file without suffix'}; use {', '.join(MOST)}")
     with reader.open(path) as trajectory:
         if trajectory.particles == 0:
             raise RenderError(f"{path}: has no particles, so there is nothing to draw")
-        chosen = choose(trajectory, frames, GIF_FRAMES if output.suffix.lower() == ".gif" else SHEET_FRAMES)
+        chosen = choose(trajectory, frames, MOST[suffix])
+        clock = moving.clock(trajectory.time[chosen])
+        if suffix != ".png":
+            kept = moving.apart(clock, moving.SHORTEST[suffix])
+            chosen, clock = [chosen[k] for k in kept], clock[kept]
         title = str(trajectory.scene.get("name") or Path(path).stem)
         try:
             view = View(trajectory, width, height)
-            pictures = [label(view.draw(frame), f"{trajectory.time[frame]:.2f} s") for frame in chosen]
+            pictures = (label(view.draw(frame), f"{trajectory.time[frame]:.2f} s") for frame in chosen)
+            if suffix == ".png":
+                sheet(list(pictures), title).save(output)
+            elif suffix == ".gif":
+                moving.write_gif(list(pictures), clock, title, output)
+            else:
+                moving.write_mp4(pictures, clock, title, output)
+        except ImportError as error:
+            raise RenderError(f"{output}: needs imageio-ffmpeg: pip install 'verlet-numba[video]'") from error
         except (LookupError, TypeError, ValueError, ArithmeticError) as error:
             raise RenderError(f"{path}: cannot be drawn, its scene or its numbers are damaged ({error!r})") from error
-        if output.suffix.lower() == ".png":
-            sheet(pictures, title).save(output)
-        else:
-            animation(pictures, trajectory.time[chosen], title, output)
     return chosen
 
 
@@ -187,18 +196,3 @@ def sheet(pictures: list[Any], title: str) -> Any:
         row, column = divmod(number, columns)
         page.paste(picture, (gap + column * (width + gap), head + row * (height + gap)))
     return page
-
-
-def animation(frames: list[Any], time: Floats, title: str, output: Path) -> None:
-    """Write a GIF that shows each picture as long as its time (s) lasts; a GIF counts hundredths of a second."""
-    from PIL import Image
-
-    # One palette for all frames, without dithering: what stands still does not flicker.
-    sample = Image.new("RGB", (frames[0].width, 3 * frames[0].height))
-    for place, frame in enumerate((frames[0], frames[len(frames) // 2], frames[-1])):
-        sample.paste(frame, (0, place * frame.height))
-    palette = sample.quantize(256, method=Image.Quantize.MEDIANCUT)
-    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    step = np.diff(time).mean() if len(time) > 1 else 1.0
-    frames[0].save(output, save_all=True, append_images=frames[1:], duration=max(20, round(100 * step) * 10), loop=0,
-                   comment=title.encode())

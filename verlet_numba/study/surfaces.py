@@ -93,29 +93,34 @@ def body_surfaces(trajectory: Trajectory, positions: Floats, scale: float) -> li
 
     `scale` is the size of the scene, m: nothing is drawn thinner than a small part of it.
     """
-    first = np.array([body.first_particle for body in trajectory.bodies])
-    entries = {entry.get("name"): entry for entry in trajectory.scene.get("bodies", ()) if isinstance(entry, dict)}
-
-    def body_of(particle: Any) -> Any:
-        return np.searchsorted(first, particle, side="right") - 1
-
-    def radius(body: int, least: float) -> float:
-        entry = entries.get(trajectory.bodies[body].name.split(".")[0], {})     # copies are NAME.0, NAME.1 ...
-        return max(least * scale, float(entry.get("radius") or 0.5 * (entry.get("thickness") or 0.0)))
-
-    colours = PALETTE[np.arange(len(first)) % len(PALETTE)]
-    found = [surface(positions[trajectory.triangles], colours[body_of(trajectory.triangles[:, 0])])]
+    owner = owners(trajectory)
+    line_radius, dot_radius = radii(trajectory, scale)
+    colours = PALETTE[np.arange(len(trajectory.bodies)) % len(PALETTE)]
+    found = [surface(positions[trajectory.triangles], colours[owner[trajectory.triangles[:, 0]]])]
     for line in trajectory.lines:
-        body, points = int(body_of(line[0])), positions[line]
-        thick = radius(body, 0.003) if trajectory.bodies[body].kind == "rope" else 0.003 * scale
-        found.append(surface(tubes(points[:-1], points[1:], thick), colours[body]))
-        found.append(surface(dots(points, thick), colours[body]))
+        body, points = int(owner[line[0]]), positions[line]
+        found.append(surface(tubes(points[:-1], points[1:], line_radius[body]), colours[body]))
+        found.append(surface(dots(points, line_radius[body]), colours[body]))
     for number, entry in enumerate(trajectory.bodies):
         if entry.kind == "particles":
             points = positions[entry.first_particle:entry.first_particle + entry.particles]
             levels = 2 if entry.particles <= 100 else 1 if entry.particles <= 2000 else 0
-            found.append(surface(dots(points, radius(number, 0.009), levels), colours[number]))
+            found.append(surface(dots(points, dot_radius[number], levels), colours[number]))
     return found
+
+
+def owners(trajectory: Trajectory) -> Any:
+    """(N,) the number of the body that each particle is of."""
+    return np.repeat(np.arange(len(trajectory.bodies)), [body.particles for body in trajectory.bodies])
+
+
+def radii(trajectory: Trajectory, scale: float) -> tuple[Floats, Floats]:
+    """(B,) m, how thick each body's lines and its dots are drawn: as in the scene, but no thinner than a small part of `scale`."""
+    entries = {entry.get("name"): entry for entry in trajectory.scene.get("bodies", ()) if isinstance(entry, dict)}
+    told = [entries.get(body.name.split(".")[0], {}) for body in trajectory.bodies]     # copies are NAME.0, NAME.1 ...
+    own = np.array([float(entry.get("radius") or 0.5 * (entry.get("thickness") or 0.0)) for entry in told])
+    ropes = np.array([body.kind == "rope" for body in trajectory.bodies], bool)
+    return np.maximum(np.where(ropes, own, 0.0), 0.003 * scale), np.maximum(own, 0.009 * scale)
 
 
 class Placed(NamedTuple):
@@ -149,11 +154,11 @@ def solid(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
             half = 0.5 * np.array(collider["size"], float)
             sides = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
             frames = np.eye(3)
-            return np.concatenate([
+            return outward(np.concatenate([
                 grid(half * (sign * frames[axis] - frames[axis - 1] - frames[axis - 2]), 2 * half * frames[axis - 1],
-                     2 * half * frames[axis - 2], 4).reshape(-1, 3, 3) for axis, sign in sides])
+                     2 * half * frames[axis - 2], 4).reshape(-1, 3, 3) for axis, sign in sides]))
         case "sphere":
-            return float(collider["radius"]) * ball(4)
+            return outward(float(collider["radius"]) * ball(4))
         case "cylinder":
             axis = np.array(collider.get("axis", (0, 0, 1)), float)
             end = (0.5 * collider["length"] * axis / np.linalg.norm(axis))[None]
@@ -161,10 +166,17 @@ def solid(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:
             rim = tube[:72]     # corners: start, end, next end
             lids = [np.stack([rim[:, corner], np.roll(rim[:, corner], -1, axis=0), np.broadcast_to(lid, (72, 3))], 1)
                     for corner, lid in ((0, -end), (1, end))]
-            return np.concatenate([tube, *lids])
+            return outward(np.concatenate([tube, *lids]))
         case "mesh":
             return _mesh(collider, folders)
     return np.zeros((0, 3, 3))
+
+
+def outward(triangles: Floats) -> Floats:
+    """Triangles (M, 3, 3) of a convex solid about the origin, counter-clockwise seen from outside."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    inside_out = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0
+    return np.where(inside_out[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _mesh(collider: dict[str, Any], folders: Sequence[Path]) -> Floats:

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
+import verlet_numba
 from verlet_numba.run.trajectory import BodyTable, Contents, Quantity, TrajectoryFile
 from verlet_numba.study import reader
 
@@ -115,3 +116,46 @@ def test_the_reader_is_light():
     heavy = {"numba", "matplotlib", "trimesh", "scipy"}
     code = f"import sys, verlet_numba.study.reader; print(*{heavy} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
+
+
+# --- the Python API -------------------------------------------------------------------------------------------------------
+
+def test_a_body_is_read_alone(path):
+    with verlet_numba.open(path) as run:
+        line, sheet = run.body("line"), run.body("sheet")
+        assert (len(line), line.kind, line.mass) == (3, "rope", 2.0)
+        np.testing.assert_array_equal(line.positions(), POSITIONS[:, 2:5])
+        np.testing.assert_array_equal(line.positions(-1), POSITIONS[-1, 2:5])
+        np.testing.assert_array_equal(sheet.velocities([3, 1]), -POSITIONS[[3, 1], 5:])
+        assert sheet.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+        assert [part.tolist() for part in line.lines] == [[0, 1, 2]]
+        assert (line.pairs.tolist(), line.lengths.tolist()) == ([[0, 1], [1, 2]], [1, 2])
+        assert (sheet.lines, len(sheet.pairs)) == ([], 0)
+        with pytest.raises(reader.TrajectoryError, match="no body 'lin'; there are dust, line, sheet"):
+            run.body("lin")
+
+
+def test_xarray_reads_what_is_asked_of_it(path, monkeypatch):
+    xarray = pytest.importorskip("xarray")
+    with verlet_numba.open(path) as run:
+        found = run.to_xarray()
+        assert isinstance(found, xarray.Dataset)
+        asked = []
+        field = reader.Trajectory._field
+        monkeypatch.setattr(reader.Trajectory, "_field", lambda self, name, frames, *rest: asked.append(frames) or field(
+            self, name, frames, *rest))
+        np.testing.assert_array_equal(found.position.sel(time=0.1, method="nearest"), POSITIONS[6])
+        np.testing.assert_array_equal(found.velocity[2:9:3, 1, 0], -POSITIONS[2:9:3, 1, 0])
+        assert asked == [6, slice(2, 9, 3)], "and nothing else was read"
+        np.testing.assert_array_equal(found.position[::-1, [7, 0]], POSITIONS[::-1, [7, 0]])
+        np.testing.assert_array_equal(found.position.where(found.body == "sheet", drop=True), POSITIONS[:, 5:])
+        assert found.momentum.dims == ("time", "axis")
+        assert found.kinetic_energy.attrs["units"] == "J"
+        assert found.position.attrs["units"] == "m"
+
+
+def test_opening_by_the_package_is_light(path):
+    """The name alone loads nothing, reading no simulator."""
+    code = (f"import sys, verlet_numba; print(*{{'numpy', 'h5py', 'numba'}} & set(sys.modules)); verlet_numba.open({str(path)!r});"
+            "print(*{'numba', 'matplotlib', 'trimesh', 'scipy', 'xarray'} & set(sys.modules))")
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n\n"
