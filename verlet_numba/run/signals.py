@@ -1,6 +1,7 @@
 """SIGINT and SIGTERM: the first stops a run as soon as its frames are safe, the second at once."""
 
 import signal
+import threading
 from types import FrameType
 from typing import Self
 
@@ -8,13 +9,17 @@ LISTENED = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopSignals:
-    """A context manager within which the first signal is noted, and the second acts as if nobody listened."""
+    """A context manager within which the first signal is noted, and the second acts as if nobody listened.
+
+    Only the main thread can listen; in another one no signal is ever noted.
+    """
 
     def __init__(self) -> None:
         self.number: int | None = None
 
     def __enter__(self) -> Self:
-        self.before = {number: signal.signal(number, self._note) for number in LISTENED}
+        listened = LISTENED if threading.current_thread() is threading.main_thread() else ()
+        self.before = {number: signal.signal(number, self._note) for number in listened}
         return self
 
     def __exit__(self, *error: object) -> None:
