@@ -283,7 +283,7 @@ def sweep(file: Path, vary: tuple[str, ...], sets: tuple[str, ...], method: str 
     from verlet_numba.batch.document import read_document
     from verlet_numba.batch.outlook import Outlook
     from verlet_numba.batch.planning import plan as make_plan
-    from verlet_numba.batch.sweep import Engine, run_sweep
+    from verlet_numba.batch.sweep import Engine, RefusedError, run_sweep
     from verlet_numba.study import sweep_picture
 
     if picture is not None:
@@ -299,7 +299,10 @@ def sweep(file: Path, vary: tuple[str, ...], sets: tuple[str, ...], method: str 
         else:
             click.echo("\n".join(outlook.lines()))
         return
-    ended = run_sweep(plan, folder, Engine(jobs, cluster or ""), shard, resume, quiet)
+    try:
+        ended = run_sweep(plan, folder, Engine(jobs, cluster or ""), shard, resume, quiet)
+    except RefusedError as error:
+        raise Misuse(str(error)) from error
     if picture is not None and ended.table is not None:
         sweep_picture.draw(ended.table, picture)
     if as_json:

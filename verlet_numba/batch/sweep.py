@@ -21,6 +21,10 @@ SUPPOSED = 16           # workers of a cluster
 SHARE = 4               # batches of a group for each worker, at least, so that all end at about the same time
 
 
+class RefusedError(SweepError):
+    """A folder that a sweep may not write to."""
+
+
 @dataclass
 class Ended:
     """What became of a sweep, or of a shard of it."""
@@ -90,8 +94,8 @@ def run_sweep(plan: Plan, folder: Path, engine: Engine, shard: tuple[int, int] =
               quiet: bool = False) -> Ended:
     """Run what is missing of a sweep or shard into its folder.
 
-    Raises SweepError for a folder that holds another sweep, or this one's runs without `resume`, or that another process
-    writes to; OSError if it cannot be written to.
+    Raises RefusedError for a folder that holds another sweep, or this one's runs without `resume`; SweepError if another process is
+    at work in it; OSError if it cannot be written to.
     """
     runs = shard_of(plan, *shard)
     claim(plan, folder, runs, resume)
@@ -172,18 +176,18 @@ def opened(engine: Engine, most: int, stop: Callable[[], bool]) -> Iterator[Any]
 
 
 def claim(plan: Plan, folder: Path, runs: Sequence[Run], resume: bool) -> None:
-    """Make the folder this sweep's, or see that it is. Shards of one sweep share a folder."""
+    """Make the folder this sweep's, or see that it is. Shards of one sweep share a folder. Raises RefusedError."""
     document = plan.as_dict()
     if disk.is_sweep(folder):
         known = disk.read_plan(folder)
         if any(known[key] != document[key] for key in ("parameters", "measures")) or ids(known) != ids(document):
-            raise SweepError(f"{folder} holds another sweep, {len(known['runs'])} runs of {known['scene']} over "
+            raise RefusedError(f"{folder} holds another sweep, {len(known['runs'])} runs of {known['scene']} over "
                              f"{', '.join(known['parameters'])}; give another folder with -o")
         if not resume and any(disk.run_folder(folder, run.id).exists() for run in runs):
-            raise SweepError(f"{folder} has runs of this sweep already; go on with --resume, or give another folder with -o")
+            raise RefusedError(f"{folder} has runs of this sweep already; go on with --resume, or give another folder with -o")
         return
     if folder.exists() and (not folder.is_dir() or any(not entry.name.startswith(".") for entry in folder.iterdir())):
-        raise SweepError(f"{folder} exists already and is no sweep; give another folder with -o")
+        raise RefusedError(f"{folder} exists already and is no sweep; give another folder with -o")
     folder.mkdir(parents=True, exist_ok=True)
     disk.write_atomically(folder / PLAN, json.dumps(document, indent=1))
 

@@ -7,8 +7,8 @@ finished bytes (`compression`); `ordered_file` brings them to the disk so that a
 import json
 import secrets
 from collections import deque
-from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -82,6 +82,18 @@ class _Chunked:
             self.id.write_direct_chunk((first, start, 0), data, STORED_RAW if raw else 0)
 
 
+class _AtOnce(Executor):
+    """Does everything in the caller's thread."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
 class TrajectoryFile:
     """Writer of one trajectory; a context manager, which closes the file and leaves `status` at "running".
 
@@ -123,7 +135,7 @@ class TrajectoryFile:
         except BaseException:
             self._release()
             raise
-        self._thread = ThreadPoolExecutor(1, "trajectory")
+        self._thread: Executor = ThreadPoolExecutor(1, "trajectory") if beside else _AtOnce()
         self._under_way: deque[Future[None]] = deque()
 
     def append(self, time: ArrayLike, step: ArrayLike, fields: Mapping[str, ArrayLike],

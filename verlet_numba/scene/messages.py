@@ -117,7 +117,7 @@ def _missing(where: Path, path: Path, root: type[BaseModel]) -> Finding:
 
 def _path(where: Path) -> Path:
     """The path in the document: without the names that pydantic puts in for the members of unions."""
-    steps = where[:2] + where[3:] if where[0] in _KINDS and len(where) > 2 else where
+    steps = where[:2] + where[3:] if len(where) > 2 and where[0] in _KINDS else where
     return tuple(step for step in steps if not re.fullmatch(r"<\w+>", str(step)))
 
 

@@ -25,10 +25,10 @@ USUAL = ("total_energy", "constraint_error_max", "penetration_max", "speed_max",
 
 def wrong(name: str) -> str:
     """What is wrong with the name of a figure, NAME or NAME.HOW; empty if nothing is."""
-    measure, _, how = name.partition(".")
+    measure, dot, how = name.partition(".")
     if measure not in UNITS:
         return f"there is no measure {measure!r}"
-    if how and (how not in HOW or measure == "rest_time"):
+    if dot and (how not in HOW or measure == "rest_time"):
         return f"{name}: a measure may be followed by .{', .'.join(HOW)}" + ("; rest_time is one value" if how in HOW else "")
     return ""
 

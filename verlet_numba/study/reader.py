@@ -46,6 +46,9 @@ class Observables(Mapping[str, Array]):
             column = self._columns[name] = self._read(name)
         return column
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._columns)
 

@@ -98,7 +98,7 @@ def explained(axis: Axis, values: Numbers) -> float:
     if count <= len(bins) or total == 0.0:
         return 0.0
     within = sum(float(((part - part.mean()) ** 2).sum()) for part in bins)
-    return max(0.0, 1.0 - within / (count - len(bins)) * (count - 1) / total)
+    return max(0.0, 1.0 - float(within / (count - len(bins)) * (count - 1)) / total)
 
 
 def draw_effects(part: Any, parameters: Sequence[Axis], measures: dict[str, Numbers], shares: Numbers) -> None:
@@ -163,9 +163,13 @@ def dress(panel: Any, axis: Axis | None, values: Numbers) -> None:
         panel.set_xscale("log")
     if axis is not None and axis.words:
         panel.set_xticks(range(len(axis.words)), labels=axis.words)
+    elif axis is not None and axis.few and not axis.logarithmic:
+        panel.set_xticks(np.unique(axis.at))
     if logarithmic(values):
         panel.set_yscale("log")
     panel.tick_params(labelsize=7)
+    for scale in (panel.xaxis, panel.yaxis):
+        scale.get_offset_text().set_fontsize(6)
     panel.grid(alpha=0.25, linewidth=0.5)
 
 
