@@ -25,7 +25,7 @@ def rows(folder):
 def start(folder, *arguments, output="killed", runs=12):
     """A sweep of runs that take some tenths of a second each, under way in a process of its own."""
     if not (folder / "long.yaml").exists():
-        (folder / "long.yaml").write_text(SCENE.replace("duration: 0.5", "duration: 400"), encoding="utf-8")
+        (folder / "long.yaml").write_text(SCENE.replace("duration: 0.5", "duration: 150"), encoding="utf-8")
     return subprocess.Popen([sys.executable, "-m", "verlet_numba", "sweep", "long.yaml", "--vary", "bodies.0.masses.0=1:2",
                              "--samples", str(runs), "-o", output, "--resume", *arguments], cwd=folder, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -181,3 +181,9 @@ def test_mistakes_of_options_are_told_within_them(scene, vary, column, words):
 def test_a_sweep_needs_parameters(scene):
     assert "nothing is varied" in refused(scene)[0].message
     assert "mass" in refused(scene, "seed=1,2", sets=("bodies.0.mass=-1",))[0].path
+
+
+@pytest.mark.parametrize("file", sorted((Path(__file__).parents[3] / "scenes/sweeps").glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_sweeps_of_the_repository_are_good(file):
+    found = runs_of(file)
+    assert len(found.runs) == found.points > 20
