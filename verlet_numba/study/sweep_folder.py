@@ -254,5 +254,7 @@ def short(value: Any) -> str:
     """A value in few characters."""
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, list):
+        value = [float(f"{part:.4g}") if isinstance(part, float) else part for part in value]
     text = str(cell(value))
     return text if len(text) <= 24 else text[:21] + "..."

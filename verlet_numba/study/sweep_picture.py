@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verlet_numba.study import figures
-from verlet_numba.study.sweep_folder import Table, short
+from verlet_numba.study.sweep_folder import Table, cell, short
 
 PICTURES = (".png", ".svg", ".pdf")
 MOST = 8                # parameters, and measures, that are drawn
@@ -22,8 +22,9 @@ class Axis:
     def __init__(self, name: str, values: Sequence[Any]) -> None:
         self.name = name
         numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
-        self.words = [] if numbers else sorted({short(value) for value in values})
-        self.at: Numbers = np.array(values if numbers else [self.words.index(short(value)) for value in values], float)
+        others = {} if numbers else {str(cell(value)): short(value) for value in values}
+        self.words = [others[word] for word in sorted(others)]
+        self.at: Numbers = np.array(values if numbers else [sorted(others).index(str(cell(value))) for value in values], float)
         levels = np.unique(self.at)
         self.few = len(levels) <= BINS
         positive = bool(len(levels)) and levels[0] > 0
@@ -59,7 +60,7 @@ def draw(known: Table, path: Path) -> None:
     parameters = [Axis(name, [row.values[k] for row in known.rows]) for k, name in enumerate(known.parameters)][:MOST]
     measures = varying(known)
     rows, columns, pairs = max(1, len(measures)), max(1, len(parameters)), max(0, len(measures) - 1)
-    left, right = 2.6 * columns + 0.6, 2.1 * pairs + 0.9 if pairs else 0.0
+    left, right = 2.6 * columns + 0.6, max(3.4, 2.1 * pairs + 1.2) if pairs else 0.0
     figure = Figure(figsize=(max(5.0, left + right), 2.0 * rows + 0.9), layout="constrained")
     FigureCanvasAgg(figure)
     told = f"{len(known.rows)} runs" + (f", {len(known.failed())} of them failed" if known.failed() else "")
@@ -107,7 +108,7 @@ def draw_effects(part: Any, parameters: Sequence[Axis], measures: dict[str, Numb
     for row, (name, values) in enumerate(measures.items()):
         for column, axis in enumerate(parameters):
             panel = panels[row, column]
-            panel.plot(axis.at, values, "o", color="C0", markersize=3, alpha=0.35, markeredgewidth=0)
+            panel.plot(axis.at, values, "o", color="C0", markersize=3.2, alpha=0.7 if len(values) < 200 else 0.35, markeredgewidth=0)
             panel.plot(*means(axis, values), "-o", color="C3", linewidth=1.6, markersize=3.5)
             panel.text(0.97, 0.95, f"{shares[row, column]:.0%}", transform=panel.transAxes, ha="right", va="top", fontsize=8,
                        color="C3", bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0})
@@ -163,8 +164,11 @@ def dress(panel: Any, axis: Axis | None, values: Numbers) -> None:
         panel.set_xscale("log")
     if axis is not None and axis.words:
         panel.set_xticks(range(len(axis.words)), labels=axis.words)
-    elif axis is not None and axis.few and not axis.logarithmic:
-        panel.set_xticks(np.unique(axis.at))
+        panel.set_xlim(-0.5, len(axis.words) - 0.5)
+    elif axis is not None and axis.few:
+        levels = np.unique(axis.at)
+        panel.set_xticks(levels, labels=[short(level) for level in levels.tolist()])
+        panel.set_xticks([], minor=True)
     if logarithmic(values):
         panel.set_yscale("log")
     panel.tick_params(labelsize=7)
@@ -174,15 +178,15 @@ def dress(panel: Any, axis: Axis | None, values: Numbers) -> None:
 
 
 def logarithmic(values: Numbers) -> bool:
-    """Whether a measure is positive and spans more than a factor of 30."""
+    """Whether a measure is positive and spans more than a factor of 30. What spans all digits has rounding errors for zeros."""
     there = values[np.isfinite(values)]
-    return bool(len(there)) and bool(there.min() > 0) and bool(there.max() > 30 * there.min())
+    return bool(len(there)) and bool(there.min() > 0) and bool(30 * there.min() < there.max() < 1e9 * there.min())
 
 
 def label(column: str) -> str:
     """A column in words, its unit below."""
     unit = figures.unit(column)
-    return column.replace("_", " ") + (f"\n[{unit}]" if unit else "")
+    return column.replace("_", " ").replace(".", ", ") + (f"\n[{unit}]" if unit else "")
 
 
 def shortened(path: str) -> str:

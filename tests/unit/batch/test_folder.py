@@ -60,9 +60,9 @@ def test_a_shard_joins_a_folder_that_has_nothing_of_it(planned, tmp_path):
 
 
 def test_one_process_at_a_time_runs_a_shard(folder):
-    with locked(folder, (1, 2)), locked(folder, (2, 2)):
-        with pytest.raises(SweepError, match="another process"), locked(folder, (1, 2)):
-            pass
+    again = locked(folder, (1, 2))
+    with locked(folder, (1, 2)), locked(folder, (2, 2)), pytest.raises(SweepError, match="another process"):
+        again.__enter__()
     with locked(folder, (1, 2)):
         pass
 
