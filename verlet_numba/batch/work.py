@@ -121,8 +121,8 @@ def result_of(job: Job, outcome: Summary | Exception, measures: Sequence[str]) -
 
 
 def seconds(summary: Summary) -> float:
-    """Wall seconds of a run, from building to writing."""
-    return round(sum(summary.seconds.values()), 6)
+    """Wall seconds of a run: building, simulating, writing; making or loading machine code is not counted."""
+    return round(sum(spent for phase, spent in summary.seconds.items() if phase != "compile"), 6)
 
 
 def one_line(error: Exception) -> str:

@@ -108,7 +108,8 @@ def draw_effects(part: Any, parameters: Sequence[Axis], measures: dict[str, Numb
     for row, (name, values) in enumerate(measures.items()):
         for column, axis in enumerate(parameters):
             panel = panels[row, column]
-            panel.plot(axis.at, values, "o", color="C0", markersize=3.2, alpha=0.7 if len(values) < 200 else 0.35, markeredgewidth=0)
+            panel.plot(axis.at, values, "o", color="C0", markersize=3.2, markeredgewidth=0,
+                       alpha=0.7 if len(values) < 200 else 0.35)
             panel.plot(*means(axis, values), "-o", color="C3", linewidth=1.6, markersize=3.5)
             panel.text(0.97, 0.95, f"{shares[row, column]:.0%}", transform=panel.transAxes, ha="right", va="top", fontsize=8,
                        color="C3", bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0})
