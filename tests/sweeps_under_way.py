@@ -64,12 +64,12 @@ def until(condition, seconds=240.0):
     return found
 
 
-def kill_workers(sweep, times):
-    """SIGKILL to workers in the midst of a run, so many times, as long as the sweep is at work. Returns how many there were."""
+def kill_workers(sweep, folder, runs, times):
+    """SIGKILL to workers in the midst of a run, so many times, spread over the sweep. Returns how many there were."""
     killed = 0
     while killed < times and sweep.poll() is None:
         busy = [pid for pid in workers(sweep.pid) if at_work(pid)]
-        if busy:
+        if busy and len(list(folder.glob("runs/*/result.json"))) >= killed * runs // (times + 1):
             os.kill(busy[killed % len(busy)], signal.SIGKILL)
             killed += 1
         time.sleep(0.05)

@@ -172,7 +172,7 @@ def test_analyze_tells_a_sweep_as_table_json_csv_and_picture(folder, swept, verl
 @pytest.mark.parametrize(("runs", "kills"), [(6, 2), pytest.param(200, 50, marks=pytest.mark.validate)])
 def test_killed_workers_cost_nothing_but_time(folder, runs, kills):
     sweep = start(folder, "--jobs", "2", output=f"killed_{runs}", runs=runs)
-    assert kill_workers(sweep, kills) == kills
+    assert kill_workers(sweep, folder / f"killed_{runs}", runs, kills) == kills
     _, err = sweep.communicate(timeout=900)
     assert sweep.returncode == 0, err
     assert "Traceback" not in err

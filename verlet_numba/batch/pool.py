@@ -58,9 +58,9 @@ class PoolError(Exception):
 class _Worker:
     """A process, as its parent sees it."""
 
-    def __init__(self, context: Any) -> None:
+    def __init__(self, context: Any, prepare: Callable[[], object]) -> None:
         self.connection, theirs = context.Pipe()
-        self.process: BaseProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self.process: BaseProcess = context.Process(target=_serve, args=(theirs, prepare), daemon=True)
         before = signal.signal(signal.SIGINT, signal.SIG_IGN)       # inherited: Ctrl-C while it starts is for its parent
         self.process.start()
         signal.signal(signal.SIGINT, before)
@@ -87,12 +87,13 @@ class _Worker:
 class Pool:
     """Workers that are kept from one kind of work to the next. A context manager, which ends them."""
 
-    def __init__(self, jobs: int, stop: Callable[[], bool] = bool) -> None:
-        self.stop = stop
+    def __init__(self, jobs: int, stop: Callable[[], bool] = bool, prepare: Callable[[], object] = bool) -> None:
+        """`prepare` is what every worker does first, all at the same time."""
+        self.stop, self._prepare = stop, prepare
         self._context = multiprocessing.get_context("spawn")
         self._jobs = jobs
         self._failed_starts = 0
-        self._workers = [_Worker(self._context) for _ in range(jobs)]
+        self._workers = [_Worker(self._context, prepare) for _ in range(jobs)]
 
     def __enter__(self) -> Self:
         return self
@@ -159,7 +160,7 @@ class Pool:
             blamed = worker.begun or worker.left[:1]
             for key in todo.returned(worker.batch, worker.left, blamed):
                 yield key, Undone(f"its worker process died {MOST_TRIES} times, at last {manner(code)}", True)
-        self._workers.append(_Worker(self._context))
+        self._workers.append(_Worker(self._context, self._prepare))
 
 
 class _Queue:
@@ -203,11 +204,12 @@ def manner(code: int) -> str:
         return f"by signal {-code}"
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, prepare: Callable[[], object]) -> None:
     """A worker's life: batches come in through the pipe, what becomes of them goes out. It has no part in its parent's terminal."""
     os.setpgid(0, 0)
     batches: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_receive, args=(connection, batches), daemon=True).start()
+    prepare()
     connection.send(("ready", ""))
     while True:
         work, batch = batches.get()

@@ -94,8 +94,8 @@ def run_sweep(plan: Plan, folder: Path, engine: Engine, shard: tuple[int, int] =
               quiet: bool = False) -> Ended:
     """Run what is missing of a sweep or shard into its folder.
 
-    Raises RefusedError for a folder that holds another sweep, or this one's runs without `resume`; SweepError if another process is
-    at work in it; OSError if it cannot be written to.
+    Raises RefusedError for a folder that holds another sweep, or this one's runs without `resume`; SweepError if another
+    process is at work in it; OSError if it cannot be written to.
     """
     runs = shard_of(plan, *shard)
     claim(plan, folder, runs, resume)
@@ -171,7 +171,8 @@ def opened(engine: Engine, most: int, stop: Callable[[], bool]) -> Iterator[Any]
             yield cluster
     else:
         from verlet_numba.batch.pool import Pool
-        with Pool(min(engine.jobs, most), stop) as pool:
+        from verlet_numba.batch.work import load
+        with Pool(min(engine.jobs, most), stop, load) as pool:
             yield pool
 
 

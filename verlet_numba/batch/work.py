@@ -1,4 +1,7 @@
-"""What a worker does with a batch, on any engine: simulate its runs, measure their files, write their results to the disk."""
+"""What a worker does with a batch, on any engine: simulate its runs, measure their files, write their results to the disk.
+
+The process that hands out batches imports this too, but never Numba: what needs it is imported by the functions below.
+"""
 
 import contextlib
 import hashlib
@@ -7,17 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import verlet_numba
-from verlet_numba.batch.group import Job, advance_group, prepared
-from verlet_numba.run.simulate import Summary
-from verlet_numba.run.warm import warm_up
 from verlet_numba.scene.load import validate
 from verlet_numba.scene.overrides import override
 from verlet_numba.scene.source import Source, compose
 from verlet_numba.study import figures, reader
 from verlet_numba.study.sweep_folder import FAILED, LASTING, RESULT, TRAJECTORY, Result, read_result, run_folder, write_result
+
+if TYPE_CHECKING:
+    from verlet_numba.batch.group import Job
+    from verlet_numba.run.simulate import Summary
 
 SIGNED = ("physics", "kernels", "effects", "scene", "run", "buffers.py", "frame.py")       # what a result comes from
 
@@ -53,11 +57,18 @@ class Batch:
                      tuple(run for run in self.runs if run.id in keys))
 
 
+def load() -> None:
+    """Import what simulating needs, so that workers do while the first of them compiles."""
+    import verlet_numba.batch.group  # noqa: F401
+
+
 def simulate_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[str, Result], None]) -> None:
     """Every run of a batch that has no result yet. `begin(id)` before, `done(id, result)` after each.
 
     Ends the process after a signal, when the frames of the run at hand are in its file.
     """
+    from verlet_numba.batch.group import advance_group
+
     jobs = []
     for run in batch.runs:
         result = read_result(batch.folder, run.id)
@@ -69,7 +80,7 @@ def simulate_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[s
         except (OSError, ValueError) as error:
             done(run.id, Result(run.id, FAILED, 0.0, {}, reason=one_line(error), program=program()))
     for job, outcome in advance_group(jobs, begin):
-        if isinstance(outcome, Summary) and outcome.signal is not None:
+        if not isinstance(outcome, Exception) and outcome.signal is not None:
             raise SystemExit(128 + outcome.signal)
         result = result_of(job, outcome, batch.measures)
         try:
@@ -81,6 +92,9 @@ def simulate_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[s
 
 def warm_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[str, None], None]) -> None:
     """Machine code for the first run of a batch, without simulating it. What is wrong with the run is told when it is run."""
+    from verlet_numba.batch.group import prepared
+    from verlet_numba.run.warm import warm_up
+
     first = batch.runs[0]
     begin(first.id)
     with contextlib.suppress(Exception):
@@ -88,8 +102,10 @@ def warm_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[str, 
     done(first.id, None)
 
 
-def job_of(batch: Batch, run: Named) -> Job:
-    """A run's scene from its text and overrides, and where it goes; what an earlier try has left there is gone."""
+def job_of(batch: Batch, run: Named) -> "Job":
+    """A run's scene from its text and overrides, and where it goes; an earlier result of it is gone."""
+    from verlet_numba.batch.group import Job
+
     place = run_folder(batch.folder, run.id)
     place.mkdir(parents=True, exist_ok=True)
     (place / RESULT).unlink(missing_ok=True)
@@ -104,7 +120,7 @@ def document(text: str, name: str) -> Source:
     return compose(text, name)[0]
 
 
-def result_of(job: Job, outcome: Summary | Exception, measures: Sequence[str]) -> Result:
+def result_of(job: "Job", outcome: "Summary | Exception", measures: Sequence[str]) -> Result:
     """How a run ended and what its file measures."""
     if isinstance(outcome, Exception):
         return Result(job.id, FAILED, 0.0, {}, reason=one_line(outcome), program=program())
@@ -120,7 +136,7 @@ def result_of(job: Job, outcome: Summary | Exception, measures: Sequence[str]) -
     return Result(job.id, outcome.status, seconds(outcome), found, outcome.frames, reason, program())
 
 
-def seconds(summary: Summary) -> float:
+def seconds(summary: "Summary") -> float:
     """Wall seconds of a run: building, simulating, writing; making or loading machine code is not counted."""
     return round(sum(spent for phase, spent in summary.seconds.items() if phase != "compile"), 6)
 
