@@ -104,12 +104,14 @@ def blank(contents: Contents, planned_frames: int) -> bytes:
     """
     global _kept
     digest = contents.topology(planned_frames)
-    if _kept[0] != digest:
+    known, image = _kept
+    if known != digest:
         with h5py.File("blank", "w", driver="core", backing_store=False, libver=LIBVER) as file:
             create_layout(file, contents, planned_frames)
             file.flush()
-            _kept = digest, file.id.get_file_image()
-    return _kept[1]
+            image = file.id.get_file_image()
+        _kept = digest, image
+    return image
 
 
 _kept: tuple[bytes, bytes] = (b"", b"")         # digest of what a blank depends on, and the blank
