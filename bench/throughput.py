@@ -11,10 +11,11 @@ import projections
 import report
 import rope
 import start_up
+import sweep
 import writing
 
 RESULTS = Path(__file__).parent / "results"
-STUDIES = {module.STUDY: module.measure for module in (projections, rope, start_up, writing, memory)}
+STUDIES = {module.STUDY: module.measure for module in (projections, rope, start_up, sweep, writing, memory)}
 
 
 @click.command()

@@ -15,7 +15,7 @@ import click
 
 from verlet_numba._version import __version__
 
-FAILED, WRONG, DIVERGED, OUT_OF_TIME, INTERRUPTED, TERMINATED = 1, 2, 3, 5, 130, 143
+FAILED, WRONG, DIVERGED, RUNS_FAILED, OUT_OF_TIME, INTERRUPTED, TERMINATED = 1, 2, 3, 4, 5, 130, 143
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
@@ -39,6 +39,14 @@ def show_version(context: click.Context, parameter: click.Parameter, wanted: boo
         from verlet_numba.run.layout import FORMAT
         click.echo(f"verlet-numba {__version__}, file format {FORMAT}, numba {version('numba')}")
         context.exit()
+
+
+def parse_shard(context: click.Context, parameter: click.Parameter, text: str) -> tuple[int, int]:
+    """I/N as two numbers."""
+    found = re.fullmatch(r"([1-9]\d{0,8})/([1-9]\d{0,8})", text)
+    if not found or int(found[1]) > int(found[2]):
+        raise click.BadParameter(f"{text!r}: write I/N, the I-th of N parts, such as 1/4", context, parameter)
+    return int(found[1]), int(found[2])
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -297,12 +305,16 @@ def analyze(places: tuple[Path, ...], names: tuple[str, ...], body: str | None, 
             csv_file: Path | None, picture: Path | None, overwrite: bool) -> None:
     """Measure trajectories, side by side, from their files alone: energies, momenta, errors, penetration, rest ..."""
     from verlet_numba.study import analyze as study
+    from verlet_numba.study.sweep_folder import is_sweep
 
     for output in (csv_file, picture):
         if output is not None:
             refuse_existing(output, overwrite)
-    if picture is not None and picture.suffix.lower() not in study.PICTURES:
-        raise Misuse(f"{picture}: cannot draw {picture.suffix or 'a file without suffix'}; use {', '.join(study.PICTURES)}")
+    if picture is not None:
+        refuse_format(picture, study.PICTURES)
+    if any(map(is_sweep, places)):
+        analyze_sweeps(places, names, body, recompute, as_json, csv_file, picture)
+        return
     try:
         found = [study.analyze(file, names, body, recorded=not recompute) for file in study.trajectories(places)]
     except study.MeasureError as error:
@@ -315,6 +327,91 @@ def analyze(places: tuple[Path, ...], names: tuple[str, ...], body: str | None, 
         print_json({"files": [each.as_dict() for each in found]})
     else:
         click.echo("\n".join(study.table(found)))
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path), metavar="SWEEP_OR_SCENE")
+@click.option("--vary", multiple=True, metavar="PATH=SPEC", help="A key to vary: values 1,2,3, a range 0.1:0.9, or 0.1:10:log.")
+@SETS
+@click.option("--method", type=click.Choice(["grid", "zip", "random", "lhs", "sobol"]),
+              help="How values come together. [default: lhs where there is a range, else grid]")
+@click.option("--samples", type=click.IntRange(1), help="Runs of random, lhs, sobol; steps of a range in grid and zip.")
+@click.option("--seed", type=click.IntRange(0), help="Of random, lhs and sobol. [default: 0]")
+@click.option("--measure", "measures", multiple=True, metavar="NAME", help="A column of the table, as speed_max or speed_max.last.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder of the sweep. [default: NAME.sweep]")
+@click.option("--jobs", type=click.IntRange(1), help="Processes that simulate. [default: one a core]")
+@click.option("--cluster", metavar="ADDRESS", help="Run on a Dask cluster, tcp://..., or on one made here: local.")
+@click.option("--resume", is_flag=True, help="Run what is missing in the folder; what it has is kept.")
+@click.option("--dry-run", is_flag=True, help="Show the runs, and run nothing.")
+@click.option("--shard", default="1/1", metavar="I/N", callback=parse_shard, help="The I-th of N parts, counted from 1.")
+@click.option("--plot", "picture", type=click.Path(path_type=Path), help="Draw effects and measures to this .png, .svg or .pdf.")
+@AS_JSON
+@QUIET
+def sweep(file: Path, vary: tuple[str, ...], sets: tuple[str, ...], method: str | None, samples: int | None, seed: int | None,
+          measures: tuple[str, ...], output: Path | None, jobs: int | None, cluster: str | None, resume: bool, dry_run: bool,
+          shard: tuple[int, int], picture: Path | None, as_json: bool, quiet: bool) -> None:
+    """Run SWEEP.yaml, or SCENE.yaml with what --vary names: many runs, one table."""
+    from verlet_numba.batch.document import read_document
+    from verlet_numba.batch.outlook import Outlook
+    from verlet_numba.batch.planning import plan as make_plan
+    from verlet_numba.batch.sweep import Engine, RefusedError, run_sweep
+    from verlet_numba.study import sweep_picture
+
+    if picture is not None:
+        refuse_existing(picture, resume)
+        refuse_format(picture, sweep_picture.PICTURES)
+    options = {"method": method, "samples": samples, "seed": seed, "measures": list(measures)}
+    plan = make_plan(read_document(file, vary, sets, options))
+    folder = output or Path(f"{file.stem}.sweep")
+    if dry_run:
+        outlook = Outlook(plan, folder, shard)
+        if as_json:
+            print_json(outlook.as_dict())
+        else:
+            click.echo("\n".join(outlook.lines()))
+        return
+    try:
+        ended = run_sweep(plan, folder, Engine(jobs, cluster or ""), shard, resume, quiet)
+    except RefusedError as error:
+        raise Misuse(str(error)) from error
+    if picture is not None and ended.table is not None:
+        sweep_picture.draw(ended.table, picture)
+    if as_json:
+        print_json(ended.as_dict())
+    elif not quiet:
+        click.echo("\n".join(ended.lines()))
+    for line in ended.troubles():
+        say(line)
+    if ended.signal is not None:
+        raise SystemExit(128 + ended.signal)
+    if ended.failed:
+        raise SystemExit(RUNS_FAILED)
+
+
+def analyze_sweeps(folders: tuple[Path, ...], names: tuple[str, ...], body: str | None, recompute: bool, as_json: bool,
+                   csv_file: Path | None, picture: Path | None) -> None:
+    """Tables of sweeps; measures are taken of the trajectories anew where any are named."""
+    from verlet_numba.study import sweep_folder, sweep_picture
+    from verlet_numba.study.measures import MeasureError
+
+    if not all(map(sweep_folder.is_sweep, folders)):
+        raise Misuse("folders of sweeps and trajectory files cannot be told side by side; name one kind")
+    if len(folders) > 1 and (csv_file or picture):
+        raise Misuse("--csv and --plot take one sweep")
+    found = [sweep_folder.table(folder) for folder in folders]
+    if names or body or recompute:
+        try:
+            found = [sweep_folder.measured(each, names or each.columns, body, not recompute) for each in found]
+        except MeasureError as error:
+            raise Misuse(str(error)) from error
+    if csv_file is not None:
+        sweep_folder.write_table(found[0], csv_file)
+    if picture is not None:
+        sweep_picture.draw(found[0], picture)
+    if as_json:
+        print_json({"sweeps": [each.as_dict() for each in found]})
+    else:
+        click.echo("\n".join(line for each in found for line in sweep_folder.lines(each)))
 
 
 @cli.command()
@@ -399,6 +496,11 @@ def refuse_existing(output: Path, overwrite: bool, ways: str = "give another wit
         raise Misuse(f"{output} is a folder; name a file with -o")
     if not output.parent.is_dir():
         raise Misuse(f"{output.parent} is no folder; make it first, or give another with -o")
+
+
+def refuse_format(picture: Path, known: Iterable[str]) -> None:
+    if picture.suffix.lower() not in known:
+        raise Misuse(f"{picture}: cannot draw {picture.suffix or 'a file without suffix'}; use {', '.join(known)}")
 
 
 def say(text: str) -> None:

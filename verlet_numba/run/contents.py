@@ -4,6 +4,7 @@ import json
 import platform
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from itertools import accumulate
 from pathlib import Path
@@ -106,18 +107,24 @@ def body_table(bodies: list[Body]) -> BodyTable:
 
 def provenance(prepared: Prepared, model: Model, command: str) -> dict[str, str | int | float]:
     """Where a file comes from: enough to make it again."""
-    versions = {"verlet-numba": __version__, "format": FORMAT, "python": platform.python_version(),
-                **{name: version(name) for name in LIBRARIES}}
     return {"scene_text": prepared.loaded.source.text, "folder": str(prepared.loaded.folder.resolve()),
             "scene": json.dumps(resolved(prepared.scene)), "command": command,
-            "seed": prepared.scene.seed, "versions": json.dumps(versions), "cpu": cpu(),
+            "seed": prepared.scene.seed, "versions": json.dumps(versions()), "cpu": cpu(),
             "plan": json.dumps(plan(prepared, model)), "start": now()}
+
+
+@cache
+def versions() -> dict[str, str | int]:
+    """Versions of the program, of its files, of Python and the libraries."""
+    return {"verlet-numba": __version__, "format": FORMAT, "python": platform.python_version(),
+            **{name: version(name) for name in LIBRARIES}}
 
 
 def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
+@cache
 def cpu() -> str:
     """The processor's name, as far as the system tells it."""
     try:

@@ -9,6 +9,7 @@ What the readers insist on, found by trial:
 - Stock VTK reads gzip and shuffle, not lzf, blosc or zstd.
 """
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ CHUNK_BYTES = 65536                 # small frames share a chunk of about this s
 CHUNK_FRAMES = 64
 CHUNK_ROWS = 512                    # of time, step and observables
 PIECE_BYTES = 4 << 20               # a frame above this size is cut into pieces
+TEXT = h5py.string_dtype()
 UNITS = {"position": "m", "velocity": "m s-1"}
 
 Integers = NDArray[np.int64]
@@ -74,6 +76,18 @@ class Contents:
         body = np.searchsorted(np.asarray(self.bodies.first_particle), firsts, side="right") - 1
         return {"Vertices": vertices[:, None], "Lines": self.lines, "Polygons": self.polygons}, body
 
+    def topology(self, planned_frames: int) -> bytes:
+        """Digest of all that a blank file depends on: everything but lengths, masses and what provenance says."""
+        bodies = self.bodies._replace(mass=len(self.bodies.name))
+        arrays = (self.pairs, self.polygons, *self.lines, *map(np.asarray, bodies[2:]))
+        names = (planned_frames, chunk_shape(self.particles, self.dtype, planned_frames), self.particles, self.fields, self.dtype,
+                 bodies.name, bodies.kind, self.observables,
+                 {name: type(value) for name, value in self.provenance.items()}, [array.shape for array in arrays])
+        digest = hashlib.sha256(repr(names).encode())
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.digest()
+
 
 def chunk_shape(particles: int, dtype: str, planned_frames: int) -> tuple[int, int, int]:
     """About 64 KiB of whole frames; one frame from 5,000 particles on; equal pieces of a frame above 4 MiB."""
@@ -83,14 +97,43 @@ def chunk_shape(particles: int, dtype: str, planned_frames: int) -> tuple[int, i
     return frames, -(-particles // -(-frame // PIECE_BYTES)), 3
 
 
+def blank(contents: Contents, planned_frames: int) -> bytes:
+    """A file with every group and dataset of a trajectory and no frame, made in memory; `fill_in` completes it.
+
+    Making some seventy datasets takes HDF5 longer than a short run, so the last blank is kept: runs of a sweep share it.
+    """
+    global _kept
+    digest = contents.topology(planned_frames)
+    known, image = _kept
+    if known != digest:
+        with h5py.File("blank", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+            create_layout(file, contents, planned_frames)
+            file.flush()
+            image = file.id.get_file_image()
+        _kept = digest, image
+    return image
+
+
+_kept: tuple[bytes, bytes] = (b"", b"")         # digest of what a blank depends on, and the blank
+
+
 def create_layout(file: h5py.File, contents: Contents, planned_frames: int) -> None:
-    """Create every group and dataset of a trajectory, with no frame in it."""
+    """Create every group and dataset of a trajectory, with no frame in it; what runs of equal topology differ in is left blank."""
     sources = _create_trajectory(file, contents, planned_frames)
     _create_observables(file, contents.observables, planned_frames)
     _create_constraints(file.create_group("connectivity/distance"), contents)
     _create_bodies(file.create_group("bodies"), contents.bodies)
     _create_provenance(file.create_group("provenance"), contents.provenance)
     create_vtkhdf(file, *contents.cells(), sources, planned_frames)
+
+
+def fill_in(file: h5py.File, contents: Contents) -> None:
+    """Write what a blank lacks: lengths of sticks, masses of bodies, provenance."""
+    numbers = {"connectivity/distance/length": contents.lengths, "bodies/mass": np.asarray(contents.bodies.mass)}
+    texts = {f"provenance/{name}": np.array(value, TEXT if isinstance(value, str) else None)
+             for name, value in contents.provenance.items()}
+    for path, values in (numbers | texts).items():
+        h5py.h5d.open(file.id, path.encode()).write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(values))
 
 
 def _scale(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
@@ -154,7 +197,7 @@ def _create_observables(file: h5py.File, observables: dict[str, Quantity], plann
 def _create_constraints(group: h5py.Group, contents: Contents) -> None:
     constraint, end = _scale(group, "constraint", len(contents.pairs)), _scale(group, "end", 2)
     _attach(write_static(group, "pairs", contents.pairs.astype(np.int32)), constraint, end)
-    length = write_static(group, "length", contents.lengths.astype(np.float64))
+    length = write_static(group, "length", np.zeros(len(contents.pairs)))
     length.attrs["units"] = "m"
     _attach(length, constraint)
 
@@ -165,7 +208,7 @@ def _create_bodies(group: h5py.Group, bodies: BodyTable) -> None:
         if name in ("name", "kind"):
             dataset = group.create_dataset(name, data=column, dtype=h5py.string_dtype())
         else:
-            dataset = write_static(group, name, np.asarray(column, np.float64 if name == "mass" else np.int64))
+            dataset = write_static(group, name, np.zeros(len(bodies.name)) if name == "mass" else np.asarray(column, np.int64))
         _attach(dataset, scale)
     group["mass"].attrs["units"] = "kg"
 
@@ -173,7 +216,8 @@ def _create_bodies(group: h5py.Group, bodies: BodyTable) -> None:
 def _create_provenance(group: h5py.Group, provenance: dict[str, str | int | float]) -> None:
     """`status` and `end` have a fixed size, so that they change in place."""
     group.attrs["format"] = FORMAT
-    for name, value in {**provenance, "timing": "{}"}.items():
-        group[name] = value
+    for name, value in provenance.items():
+        group[name] = type(value)()
+    group["timing"] = "{}"
     group.create_dataset("status", (), "S16", data=b"running")
     group.create_dataset("end", (), "S40", data=b"")

@@ -7,8 +7,8 @@ finished bytes (`compression`); `ordered_file` brings them to the disk so that a
 import json
 import secrets
 from collections import deque
-from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verlet_numba.run.compression import STORED_RAW, encode, round_mantissa
-from verlet_numba.run.layout import LIBVER, BodyTable, Contents, Quantity, create_layout
+from verlet_numba.run.layout import LIBVER, BodyTable, Contents, Quantity, blank, fill_in
 from verlet_numba.run.ordered_file import OrderedFile
 
 __all__ = ["BodyTable", "Contents", "Quantity", "TrajectoryFile"]
@@ -53,10 +53,11 @@ class _Block:
 
 
 class _Rows:
-    """A dataset (T,) or (T, w) that grows by rows. h5py's own indexing takes ten times as long."""
+    """A dataset (T,) or (T, w) that grows by rows. h5py's own opening and indexing take ten times as long."""
 
-    def __init__(self, dataset: h5py.Dataset) -> None:
-        self.id, self.dtype, self.type = dataset.id, dataset.dtype, h5py.h5t.py_create(dataset.dtype)
+    def __init__(self, file: h5py.File, path: str) -> None:
+        self.id = h5py.h5d.open(file.id, path.encode())
+        self.dtype, self.type = self.id.dtype, h5py.h5t.py_create(self.id.dtype)
 
     def write(self, first: int, rows: NDArray[Any]) -> None:
         shape = (first + len(rows), *rows.shape[1:])
@@ -84,6 +85,18 @@ class _Chunked:
                 piece[:part.shape[0], :part.shape[1]] = part
             data = piece.tobytes() if raw else encode(piece)
             self.id.write_direct_chunk((first, start, 0), data, STORED_RAW if raw else 0)
+
+
+class _AtOnce(Executor):
+    """Does everything in the caller's thread."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 class TrajectoryFile:
@@ -114,17 +127,21 @@ class TrajectoryFile:
         self._refuse_to_overwrite()
         self._disk = self._open_disk()
         try:
-            self._file = h5py.File(self._disk, "r+" if self._named else "w", libver=LIBVER, locking=False,
-                                   rdcc_nbytes=CACHE_BYTES)
             if resume_at is None:
-                create_layout(self._file, contents, planned_frames)
+                self._disk.write(memoryview(blank(contents, planned_frames)))
+            self._file = h5py.File(self._disk, "r+", libver=LIBVER, locking=False, rdcc_nbytes=CACHE_BYTES)
+            if resume_at is None:
+                fill_in(self._file, contents)
             self._attach()
-            self._resume(resume_at or 0)
+            if resume_at is None:
+                self._begin()
+            else:
+                self._resume(resume_at)
             self._commit(self.frames)
         except BaseException:
             self._release()
             raise
-        self._thread = ThreadPoolExecutor(1, "trajectory")
+        self._thread: Executor = ThreadPoolExecutor(1, "trajectory") if beside else _AtOnce()
         self._under_way: deque[Future[None]] = deque()
 
     def append(self, time: ArrayLike, step: ArrayLike, fields: Mapping[str, ArrayLike],
@@ -204,12 +221,19 @@ class TrajectoryFile:
         self._chunk_frames = int(self._fields["position"].chunk[0])
         paths = ["particles/trajectory/time", "particles/trajectory/step", "VTKHDF/Steps/Values"]
         paths += [f"observables/{name}/value" for name in self._contents.observables]
-        self._rows = {path: _Rows(self._file[path]) for path in paths}
+        self._rows = {path: _Rows(self._file, path) for path in paths}
         self._count = h5py.h5a.open(self._file["VTKHDF/Steps"].id, b"NSteps")
         self._planned = len(self._file["VTKHDF/Steps/PointOffsets"])
 
+    def _begin(self) -> None:
+        """A new file: nothing is stored, and nothing waits for its chunk to be full."""
+        self._appended = self._skip = self._stored = 0
+        self._raw = False
+        self._rest = _Block({path: np.zeros((0, *rows.id.shape[1:]), rows.dtype) for path, rows in self._rows.items()},
+                            {name: np.zeros((0, *field.shape), self._contents.dtype) for name, field in self._fields.items()})
+
     def _resume(self, frame: int) -> None:
-        """Take up the chunk that is not full, as the file has it. A new file is one with no frames."""
+        """Take up the chunk that is not full, as the file has it."""
         committed = int(self._file["VTKHDF/Steps"].attrs["NSteps"])
         particles = self._fields["position"].shape[0]
         if frame > committed or particles != self._contents.particles:

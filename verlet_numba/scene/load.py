@@ -31,25 +31,29 @@ def load(path: str | Path, sets: Sequence[str] = ()) -> Loaded:
 
 def loads(text: str, name: str, sets: Sequence[str] = ()) -> Loaded:
     """The scene in `text`; `name` is what problems call it. Raises `SceneError` with every problem."""
-    source, problems = compose(text, name)
+    return validate(*compose(text, name), sets)
+
+
+def validate(source: Source, problems: Sequence[Problem] = (), sets: Sequence[str] = ()) -> Loaded:
+    """The scene that a document with overrides says, where `problems` were found already. Raises `SceneError` with all."""
     if source.data is None:
         raise SceneError([source.problem((), "empty: nothing but white space and comments stands here")])
     if not isinstance(source.data, dict):
         raise SceneError([*problems, source.problem((), "a scene is a mapping: `version: 1`, `time: ...` and so on")])
     source, more = override(source, sets)
-    problems += more
+    found = [*problems, *more]
     scene = None
     try:
         scene = Scene.model_validate(source.data)
     except ValidationError as error:
-        problems += islice(messages.problems(error, source), MAX_PROBLEMS)
-    problems += (source.problem(path, message) for path, message in relations.findings(source.data, scene))
-    if problems or scene is None:
-        raise SceneError(_in_order(problems, source))
-    return Loaded(scene, source, Path(name).parent)
+        found += islice(messages.problems(error, source), MAX_PROBLEMS)
+    found += (source.problem(path, message) for path, message in relations.findings(source.data, scene))
+    if found or scene is None:
+        raise SceneError(in_order(found, source))
+    return Loaded(scene, source, Path(source.name).parent)
 
 
-def _in_order(problems: Sequence[Problem], source: Source) -> list[Problem]:
+def in_order(problems: Sequence[Problem], source: Source) -> list[Problem]:
     """In the order of the file, overrides last; of several about one value the first alone, which caused the others."""
     first: dict[tuple[object, ...], Problem] = {}
     for problem in problems:

@@ -24,13 +24,13 @@ _BOUNDS = {
     "less_than": ("lt", "must be below"), "less_than_equal": ("le", "must be at most")}
 
 
-def problems(error: ValidationError, source: Source) -> Iterator[Problem]:
-    """Every error of a validated scene, placed in the document."""
+def problems(error: ValidationError, source: Source, model: type[BaseModel] = Scene) -> Iterator[Problem]:
+    """Every error of a validated scene, or of another document's `model`, placed in the document."""
     for line in error.errors(include_url=False):
         if line["type"] == "extra_forbidden":
-            yield source.problem(_path(line["loc"]), _unknown(line["loc"]), key=True)
+            yield source.problem(_path(line["loc"]), _unknown(line["loc"], model), key=True)
         elif not _follows(line):
-            for path, message in _findings(line):
+            for path, message in _findings(line, model):
                 yield source.problem(path, message)
 
 
@@ -49,14 +49,14 @@ def one_of(word: object, known: Iterable[str]) -> str:
     return f"{shown(word)} is not one of {', '.join(known)}{hint}"
 
 
-def _findings(line: Any) -> Iterator[Finding]:
+def _findings(line: Any, model: type[BaseModel]) -> Iterator[Finding]:
     where, path = line["loc"], _path(line["loc"])
     kind, value, context = line["type"], line["input"], line.get("ctx", {})
     if kind == "findings":
         for inner, message in context["findings"]:
             yield (*path, *inner), message
     elif kind == "missing":
-        yield _missing(where, path)
+        yield _missing(where, path, model)
     elif kind == "union_tag_invalid":
         yield (*path, "kind"), f"kind {one_of(context['tag'], _quoted(context['expected_tags']))}"
     elif kind == "union_tag_not_found":
@@ -65,8 +65,8 @@ def _findings(line: Any) -> Iterator[Finding]:
         yield path, _about(kind, value, context, path, line["msg"])
 
 
-def _unknown(where: Path) -> str:
-    known = _keys(where[:-1])
+def _unknown(where: Path, root: type[BaseModel]) -> str:
+    known = _keys(where[:-1], root)
     return "unknown key" + (did_you_mean(str(where[-1]), known) or f"; known here: {', '.join(known)}")
 
 
@@ -106,10 +106,10 @@ def _instead(path: Path, value: Any) -> str:
     return ""
 
 
-def _missing(where: Path, path: Path) -> Finding:
+def _missing(where: Path, path: Path, root: type[BaseModel]) -> Finding:
     if isinstance(where[-1], int):
         return path[:-1], f"is too short: item {where[-1]} (counted from 0) is missing"
-    model = _model(where[:-1])
+    model = _model(where[:-1], root)
     field = next((f for k, f in model.model_fields.items() if (f.alias or k) == where[-1]), None) if model else None
     about = f" ({field.description})" if field is not None and field.description else ""
     return path, f"is missing{about}"
@@ -117,13 +117,13 @@ def _missing(where: Path, path: Path) -> Finding:
 
 def _path(where: Path) -> Path:
     """The path in the document: without the names that pydantic puts in for the members of unions."""
-    steps = where[:2] + where[3:] if where[0] in _KINDS and len(where) > 2 else where
+    steps = where[:2] + where[3:] if len(where) > 2 and where[0] in _KINDS else where
     return tuple(step for step in steps if not re.fullmatch(r"<\w+>", str(step)))
 
 
-def _model(where: Path) -> type[BaseModel] | None:
+def _model(where: Path, root: type[BaseModel]) -> type[BaseModel] | None:
     """The model of the mapping at pydantic's location; None if no mapping belongs there."""
-    model: type[BaseModel] | None = Scene
+    model: type[BaseModel] | None = root
     for depth, step in enumerate(where):
         if depth == 2 and where[0] in _KINDS:
             model = _KINDS[str(where[0])].get(str(step))
@@ -138,8 +138,8 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     return next((found for part in get_args(annotation) if (found := _model_in(part))), None)
 
 
-def _keys(where: Path) -> list[str]:
-    model = _model(where)
+def _keys(where: Path, root: type[BaseModel]) -> list[str]:
+    model = _model(where, root)
     return [field.alias or key for key, field in model.model_fields.items()] if model else []
 
 

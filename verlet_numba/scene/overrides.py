@@ -11,7 +11,7 @@ from typing import Any
 from .messages import did_you_mean
 from .problems import Path, Problem, SceneError, dotted
 from .schema_common import entry_name
-from .source import MappingMarks, Marks, Override, Source, compose, pack
+from .source import MappingMarks, Marks, Override, Source, compose, pack, unpack
 
 
 def override(source: Source, sets: Sequence[str]) -> tuple[Source, list[Problem]]:
@@ -26,45 +26,62 @@ def override(source: Source, sets: Sequence[str]) -> tuple[Source, list[Problem]
     return source, problems
 
 
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A value for `target`, a dotted path: as plain data with its marks, and where the target stands in what the user wrote."""
+
+    target: str
+    file: str               # what problems call the place: a file, or an option of the command line
+    position: int           # packed, of the target
+    data: Any
+    marks: Marks
+
+
+def lay_over(source: Source, given: Given) -> Source:
+    """The source with one value laid over it. Raises SceneError if there is no such place."""
+    words = given.target.split(".")
+    steps, position = [], given.position
+    for word in words:
+        steps.append(_Step(word, position, given.file))
+        position += len(word) + 1       # columns are the low bits
+    data, laid = _lay(source.data, steps, (), _Laid((), given.data, given.marks))
+    own = MappingMarks(given.position, {str(laid.path[-1]): laid.position}, {str(laid.path[-1]): laid.marks})
+    placed = Override(laid.path, Source(given.file, "", laid.data, own))
+    return replace(source, data=data, overrides=(*source.overrides, placed))
+
+
 def _apply(source: Source, argument: str) -> tuple[Source, list[Problem]]:
     target, equals, text = argument.partition("=")
-    words = target.split(".")
     name = f"--set {argument if argument.isprintable() else ascii(argument)}"
-    if not equals or not text.strip() or "" in words:
+    if not equals or not text.strip() or "" in target.split("."):
         raise SceneError([Problem(name, 1, 1, "", "write PATH=VALUE, such as solver.substeps=4")])
     value, problems = compose(text, name, column=len(target) + 1)
-    steps, column = [], 0
-    for word in words:
-        steps.append(_Step(word, column, name))
-        column += len(word) + 1
-    data, laid = _lay(source.data, steps, (), _Laid((), value.data, value.marks))
-    full = (*laid.path, *words[len(laid.path) :])
-    problems = [problem._replace(path=".".join(filter(None, (dotted(full), problem.path)))) for problem in problems]
-    own = MappingMarks(0, {str(laid.path[-1]): pack(0, laid.column)}, {str(laid.path[-1]): laid.marks})
-    placed = Override(laid.path, Source(name, argument, laid.data, own))
-    return replace(source, data=data, overrides=(*source.overrides, placed)), problems
+    laid = lay_over(source, Given(target, name, pack(0, 0), value.data, value.marks))
+    path = laid.overrides[-1].path
+    full = (*path, *target.split(".")[len(path) :])
+    return laid, [problem._replace(path=".".join(filter(None, (dotted(full), problem.path)))) for problem in problems]
 
 
 @dataclass(frozen=True)
 class _Step:
-    """One word of PATH, at `column` (from 0) of the argument."""
+    """One word of PATH, at a packed position of what the user wrote."""
 
     word: str
-    column: int
+    position: int
     file: str
 
     def failure(self, done: Path, message: str) -> SceneError:
-        return SceneError([Problem(self.file, 1, self.column + 1, ".".join(map(str, (*done, self.word))), message)])
+        return SceneError([Problem(self.file, *unpack(self.position), ".".join(map(str, (*done, self.word))), message)])
 
 
 @dataclass(frozen=True)
 class _Laid:
-    """What an override adds: `data` at `path`, its last key at `column` of the argument."""
+    """What an override adds: `data` at `path`, its last key at a packed position of what the user wrote."""
 
     path: Path
     data: Any
     marks: Marks
-    column: int = 0
+    position: int = 0
 
 
 def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[Any, _Laid]:
@@ -75,9 +92,8 @@ def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[A
     key: str | int = step.word
     if node is None:
         inner, laid = _lay(None, rest, (), given)
-        position = pack(0, step.column)
         made = {step.word: inner}
-        return made, _Laid(done, made, MappingMarks(position, {step.word: position}, {step.word: laid.marks}))
+        return made, _Laid(done, made, MappingMarks(step.position, {step.word: step.position}, {step.word: laid.marks}))
     if isinstance(node, list):
         key = _index(node, step, done)
         inner, laid = _lay(node[key], rest, (*done, key), given)
@@ -87,7 +103,7 @@ def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[A
         copy = {**node, step.word: inner}
     else:
         raise step.failure(done, "there is no such key: what stands above it is a single value")
-    return copy, replace(laid, column=step.column) if len(laid.path) == len(done) + 1 else laid
+    return copy, replace(laid, position=step.position) if len(laid.path) == len(done) + 1 else laid
 
 
 def _index(entries: list[Any], step: _Step, done: Path) -> int:

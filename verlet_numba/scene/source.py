@@ -89,7 +89,17 @@ class Source:
                 return override.source, path[depth - 1 :]
         return self, path
 
+    def marked(self, path: Path) -> tuple[str, int, Marks]:
+        """Name of the source that gave the value at `path`, packed position of the value's key, and the value's marks."""
+        source, inner = self._giver(path)
+        return source.name, *source._walk(inner)
+
     def _own_position(self, path: Path, key: bool) -> tuple[int, int]:
+        position, marks = self._walk(path)
+        return unpack(position if key else start_of(marks))
+
+    def _walk(self, path: Path) -> tuple[int, Marks]:
+        """Position of the key and marks of the value at `path`, else of what encloses it."""
         marks, position = self.marks, start_of(self.marks)
         for step in path:
             if isinstance(marks, MappingMarks) and str(step) in marks.keys:
@@ -98,8 +108,8 @@ class Source:
                 marks = marks.items[step]
                 position = start_of(marks)
             else:
-                return _unpack(start_of(marks))
-        return _unpack(position if key else start_of(marks))
+                return start_of(marks), start_of(marks)
+        return position, marks
 
 
 def start_of(marks: Marks) -> int:
@@ -112,7 +122,8 @@ def pack(line: int, column: int) -> int:
     return line << 24 | column        # a line has at most MAX_BYTES = 2^24 columns
 
 
-def _unpack(position: int) -> tuple[int, int]:
+def unpack(position: int) -> tuple[int, int]:
+    """Line and column, from 1, of a packed position."""
     return (position >> 24) + 1, (position & 0xFFFFFF) + 1
 
 
@@ -209,7 +220,7 @@ class _Composer:
         return SceneError(self.problems)
 
     def report(self, position: int, message: str, path: Path) -> None:
-        self.problems.append(Problem(self.name, *_unpack(position), dotted(path), message))
+        self.problems.append(Problem(self.name, *unpack(position), dotted(path), message))
         if len(self.problems) == MAX_PROBLEMS:
             raise SceneError(self.problems)
 
@@ -301,7 +312,7 @@ class _Composer:
             if len(data) == MAX_KEYS:
                 raise self.failure(key_position, f"more than {MAX_KEYS:,} keys in one mapping", path)
             if key in data:
-                first, _ = _unpack(found.keys[key])
+                first, _ = unpack(found.keys[key])
                 self.report(key_position, f"this key stands here a second time (first at line {first})", (*path, key))
             else:
                 data[key], found.keys[key], found.values[key] = value, key_position, marks

@@ -78,9 +78,10 @@ def _missing(trajectory: Trajectory, name: str, body: str | None, recorded: bool
         return f"{name} is counted for the whole scene, not for a body"
     if name in COUNTED and not (recorded and name in trajectory.observables):
         return f"{name} is known only where a run records its observables"
-    meshes = [told.get("name") for told in trajectory.scene.get("colliders", ()) if told.get("kind") == "mesh"]
-    if name == "penetration_max" and meshes and not (body is None and recorded and name in trajectory.observables):
-        return f"{name} cannot be computed: the triangles of {meshes[0]} stand in a file of their own"
+    if name == "penetration_max" and not (body is None and recorded and name in trajectory.observables):
+        meshes = [told.get("name") for told in trajectory.scene.get("colliders", ()) if told.get("kind") == "mesh"]
+        if meshes:
+            return f"{name} cannot be computed: the triangles of {meshes[0]} stand in a file of their own"
     return ""
 
 

@@ -1,6 +1,7 @@
 """Reading a trajectory: committed frames as numpy arrays, loaded when asked for."""
 
 import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -33,6 +34,29 @@ class Body(NamedTuple):
     first_face: int
     faces: int
     mass: float     # kg
+
+
+class Observables(Mapping[str, Array]):
+    """Columns by name; `read` is called for each once."""
+
+    def __init__(self, names: Iterable[str], read: Callable[[str], Array]) -> None:
+        self._columns: dict[str, Array | None] = dict.fromkeys(names)
+        self._read = read
+
+    def __getitem__(self, name: str) -> Array:
+        column = self._columns[name]
+        if column is None:
+            column = self._columns[name] = self._read(name)
+        return column
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
 
 
 class Trajectory:
@@ -117,10 +141,9 @@ class Trajectory:
         return self._read("connectivity/distance/length")
 
     @cached_property
-    def observables(self) -> dict[str, Array]:
-        """Name -> (T,) or (T, 3)."""
-        committed = slice(self.frames)
-        return {name: self._read(f"observables/{name}/value", committed) for name in self._names("observables")}
+    def observables(self) -> "Observables":
+        """Name -> (T,) or (T, 3), each read when asked for."""
+        return Observables(self._names("observables"), lambda name: self._read(f"observables/{name}/value", slice(self.frames)))
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -133,7 +156,7 @@ class Trajectory:
     def scene(self) -> dict[str, Any]:
         """The scene as resolved."""
         try:
-            scene = json.loads(self.provenance["scene"])
+            scene = json.loads(bytes(self._read("provenance/scene", ())))
         except (KeyError, TypeError, ValueError) as error:
             raise TrajectoryError(f"{self.path}: damaged: /provenance/scene is no JSON ({error})") from error
         if not isinstance(scene, dict):

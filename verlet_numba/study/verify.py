@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.run.simulate import COMPLETE, Summary, simulate
+from verlet_numba.scene.installed import SWEEPS
 from verlet_numba.scene.prepare import Prepared, prepare
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Expect
@@ -86,9 +87,9 @@ class Case:
 
 
 def scenes_in(places: Sequence[Path]) -> list[Path]:
-    """Scene files as named, and all those in folders, in alphabetical order."""
+    """Scene files as named, and all those in folders, in alphabetical order; folders `sweeps` hold none."""
     found = [sorted(place.rglob("*.yaml")) if place.is_dir() else [place] for place in places]
-    return [scene for scenes in found for scene in scenes]
+    return [scene for scenes in found for scene in scenes if scene in places or scene.parent.name != SWEEPS]
 
 
 def prepare_all(scenes: Sequence[Path]) -> list[Prepared]:

@@ -71,6 +71,29 @@ def assert_same(a, b):
         np.testing.assert_array_equal(a[name], b[name], err_msg=name)
 
 
+@pytest.mark.parametrize("changes", [
+    {"lengths": np.linspace(3, 4, 6)}, {"provenance": {"scene_text": "other", "scene": "{}" * 9999, "seed": 2**40}},
+    {"bodies": contents().bodies._replace(mass=[5.0, 6.0, 7.0])}, {"bodies": contents().bodies._replace(name=["a", "b", "c"])},
+    {"polygons": np.array([[5, 6, 7], [5, 7, 6]])}, {"pairs": contents().pairs[::-1]}, {"dtype": "f8"}, {"fields": ("position",)},
+    {"observables": {**contents().observables, "momentum": Quantity("other", 3, "f8")}}], ids=lambda changes: next(iter(changes)))
+def test_a_file_has_nothing_of_the_one_before(tmp_path, monkeypatch, changes):
+    """Files of equal topology begin as copies of one blank."""
+    write(tmp_path / "before.vtkhdf")
+    after = write(tmp_path / "after.vtkhdf", **changes)
+    monkeypatch.setattr("verlet_numba.run.layout._kept", (b"", b""))
+    fresh = write(tmp_path / "fresh.vtkhdf", **changes)
+    assert_same(datasets(after), datasets(fresh))
+    with h5py.File(after) as one, h5py.File(fresh) as other:
+        attributes = [{name: dict(item.attrs) for name, item in walked(file)} for file in (one, other)]
+        assert repr(attributes[0]) == repr(attributes[1])
+
+
+def walked(file):
+    found = []
+    file.visititems(lambda name, item: found.append((name, item)) if not name.startswith("particles/trajectory/box") else None)
+    return [(name, item) for name, item in found if isinstance(item, h5py.Group)]
+
+
 def committed(path):
     """Count of frames, after every one of them was read and compared."""
     with h5py.File(path, locking=False) as file:

@@ -1,0 +1,64 @@
+"""Processes that may die."""
+
+import signal
+
+import pytest
+from pool_work import Parts, mark, tries
+
+from verlet_numba.batch.pool import MOST_TRIES, Pool, Undone, _Queue, manner
+
+
+def work(folder, *batches, jobs=2):
+    with Pool(jobs) as pool:
+        found = list(pool.work_through(mark, [Parts(tuple(batch), folder) for batch in batches]))
+    assert len(found) == len(dict(found)), "a part was told twice"
+    return dict(found)
+
+
+def test_a_part_that_kills_its_worker_is_set_aside_and_takes_nothing_with_it(tmp_path):
+    found = work(tmp_path, ["a", "die", "b"], ["once", "c"], ["error", "d"], ["e"])
+    assert {key: found[key] for key in "abce"} == dict.fromkeys("abce", 0)
+    assert found["once"] == 1
+    assert found["die"] == Undone("its worker process died 3 times, at last by SIGKILL (out of memory?)", True)
+    assert tries(tmp_path, "die") == MOST_TRIES
+    assert found["error"] == found["d"] == Undone("ValueError: no such thing", False)
+
+
+def test_nothing_to_do_is_done(tmp_path):
+    assert work(tmp_path, jobs=1) == {}
+
+
+def test_a_stop_is_heeded_and_the_workers_end(tmp_path):
+    asked = iter([False, True])
+    with Pool(1, stop=lambda: next(asked)) as pool:
+        assert list(pool.work_through(mark, [Parts(("a",), tmp_path)])) == []
+        [worker] = pool._workers
+    assert worker.process.exitcode is not None
+
+
+def test_a_worker_ends_when_its_parent_is_gone(tmp_path):
+    with Pool(1) as pool:
+        [worker] = pool._workers
+        assert dict(pool.work_through(mark, [Parts(("a",), tmp_path)])) == {"a": 0}
+        worker.connection.close()
+        worker.process.join(30)
+        assert worker.process.exitcode == 1
+
+
+def test_who_dies_twice_waits_until_all_else_is_done(tmp_path):
+    batch = Parts(("a", "b", "c"), tmp_path)
+    todo = _Queue([batch, Parts(("d",), tmp_path)])
+    assert todo.next(alone=True) == batch
+    assert todo.returned(batch, ["b", "c"], ["b"]) == []
+    assert [todo.next(False).keys for _ in range(3)] == [("c",), ("d",), ("b",)]
+    assert todo.returned(batch, ["b"], ["b"]) == []
+    assert todo.next(alone=False) is None
+    assert todo
+    assert todo.next(alone=True).keys == ("b",)
+    assert todo.returned(batch, ["b"], ["b"]) == ["b"]
+    assert not todo
+
+
+@pytest.mark.parametrize(("code", "words"), [(3, "with exit code 3"), (-signal.SIGSEGV, "by SIGSEGV"), (-199, "by signal 199")])
+def test_how_a_process_ended_is_told(code, words):
+    assert words in manner(code)
