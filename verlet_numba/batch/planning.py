@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from verlet_numba import __version__
+from verlet_numba._version import __version__
 from verlet_numba.batch.document import Document
 from verlet_numba.batch.sample import Choice, points
 from verlet_numba.scene.load import Loaded, in_order, resolved, validate

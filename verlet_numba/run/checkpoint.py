@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba import __version__
 from verlet_numba._jit import sources
+from verlet_numba._version import __version__
 from verlet_numba.buffers import Array, World, gate
 
 FORMAT = b"verlet-numba checkpoint 1"
