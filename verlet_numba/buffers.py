@@ -80,6 +80,7 @@ class Lines(NamedTuple):
     moved: Array                # (3, W) real m; how far the particles are moved
     turned: Array               # (3, T) real SI; pivot, bond and pull turned
     marks: Array                # (V,) int 1; of each constraint's chain: 0 settled, 1 to be solved, 2 to be relaxed stick by stick
+    singly: Array               # (1,) int 1; chains that were relaxed stick by stick, so far
 
 
 class Angles(NamedTuple):

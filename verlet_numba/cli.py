@@ -15,6 +15,7 @@ from verlet_numba import __version__
 
 FAILED, WRONG, DIVERGED, INTERRUPTED = 1, 2, 3, 130
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
+TRAJECTORY = click.Path(exists=True, path_type=Path)
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
@@ -77,12 +78,15 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
         print_json(summary.as_dict())
     elif not quiet:
         click.echo(describe(summary))
+    if summary.torn and not quiet:
+        say(f"{scene}: warning: a stick ends {summary.constraint_error_end:.3g} of its length off it: what it belongs to has come "
+            "apart and its frames mean nothing, unless it is compliant or cannot have its length; use more substeps")
     if summary.divergence is not None:
-        kept = f"{summary.frames} good frames are kept in {output}" if summary.frames else "No frame was good: no file was written"
+        kept = f"{counted(summary.frames, 'good frame')} kept in {output}" if summary.frames else "No file was written"
         say(f"{scene}: {summary.divergence}. {kept}")
         raise SystemExit(DIVERGED)
     if summary.signal is not None:
-        say(f"{scene}: stopped by a signal; {summary.frames} frames are kept in {output}")
+        say(f"{scene}: stopped by a signal; {counted(summary.frames, 'frame')} kept in {output}")
         raise SystemExit(128 + summary.signal)
 
 
@@ -105,7 +109,7 @@ def check(scenes: tuple[Path, ...], sets: tuple[str, ...], quiet: bool) -> None:
         else:
             warn(prepared.warnings, quiet)
             if not quiet:
-                click.echo(f"{scene}: good" + (f", {len(prepared.warnings)} warnings" if prepared.warnings else ""))
+                click.echo(f"{scene}: good" + (f", {counted(len(prepared.warnings), 'warning')}" if prepared.warnings else ""))
     if wrong:
         raise SystemExit(WRONG)
 
@@ -152,7 +156,7 @@ def warm(scenes: tuple[Path, ...], quiet: bool) -> None:
 
 
 @cli.command()
-@click.argument("trajectory", type=click.Path(path_type=Path))
+@click.argument("trajectory", type=TRAJECTORY)
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="A .png contact sheet or a .gif.")
 @click.option("--frames", help="Frames to show: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
 @OVERWRITE
@@ -188,7 +192,7 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
 
     prepared = prepare(scene, sets)
     folder = output or Path(default_name(prepared.scene, scene)).with_suffix(".accuracy")
-    if folder.exists() and not overwrite:
+    if folder.exists() and not (folder.is_dir() and (overwrite or not any(folder.iterdir()))):
         raise Misuse(f"{folder} exists already; give another with -o, or --overwrite")
 
     from verlet_numba.study import accuracy_report as report
@@ -196,7 +200,9 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
     from verlet_numba.study.axes import AxisError, parse
 
     try:
-        found = study(prepared.loaded, sets, parse(axes), runs, budget, (lambda text: None) if quiet else say)
+        chosen = parse(axes)
+        folder.mkdir(parents=True, exist_ok=True)           # before the work, not after it
+        found = study(prepared.loaded, sets, chosen, runs, budget, (lambda text: None) if quiet else say)
     except AxisError as error:
         raise Misuse(str(error)) from error
     report.write(found, folder)
@@ -209,11 +215,12 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
     if best is not None and not as_json:
         click.echo(report.solver_yaml(best, prepared.scene.solver.model_dump(exclude_unset=True)))
     if target_error is not None and best is None:
-        raise click.ClickException(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+        say(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+        raise SystemExit(FAILED)
 
 
 @cli.command()
-@click.argument("places", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="FILE_OR_FOLDER...")
+@click.argument("places", type=TRAJECTORY, nargs=-1, required=True, metavar="FILE_OR_FOLDER...")
 @click.option("--measure", "names", multiple=True, metavar="NAME",
               help="A measure to take; may be repeated. [default: all but self_intersections]")
 @click.option("--body", metavar="NAME", help="Measure this body alone, all copies, or the copy NAME.K.")
@@ -247,8 +254,8 @@ def analyze(places: tuple[Path, ...], names: tuple[str, ...], body: str | None, 
 
 
 @cli.command()
-@click.argument("a", type=click.Path(path_type=Path))
-@click.argument("b", type=click.Path(path_type=Path))
+@click.argument("a", type=TRAJECTORY)
+@click.argument("b", type=TRAJECTORY)
 @click.option("--tolerance", type=click.FloatRange(0), default=0.0, show_default=True, help="Differences up to this are none, m.")
 def compare(a: Path, b: Path, tolerance: float) -> None:
     """Find the first frame, body and particle where trajectories A and B differ; exit 0 if there is none, 1 if there is one."""
@@ -261,7 +268,7 @@ def compare(a: Path, b: Path, tolerance: float) -> None:
     if difference is not None:
         click.echo(str(difference))
         raise SystemExit(FAILED)
-    click.echo(f"no difference in {frames} frames" + (f" by more than {tolerance:g} m" if tolerance else ""))
+    click.echo(f"no difference in {counted(frames, 'frame')}" + (f" by more than {tolerance:g} m" if tolerance else ""))
 
 
 @cli.command()
@@ -280,19 +287,24 @@ def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
     for scene in scenes:
         if not scene.scene.expect and Path(scene.loaded.source.name) in places:
             raise Misuse(f"{scene.loaded.source.name} states nothing under `expect`")
+    judged = [scene for scene in scenes if scene.scene.expect]
+    if not judged:
+        raise Misuse(f"none of {counted(len(scenes), 'scene')} in {', '.join(map(str, places))} states anything under `expect`, "
+                     "such as `expect: [{measure: penetration_max, max: 0.01}]`")
     cases = []
-    for scene in scenes:
-        if scene.scene.expect:
-            cases.append(run_case(scene, quiet=quiet or as_json))
-            if not as_json:
-                click.echo("\n".join(cases[-1].lines()))
-            if cases[-1].signal is not None:
-                raise SystemExit(128 + cases[-1].signal)
-    failed = [case.scene for case in cases if not case.held]
+    for scene in judged:
+        cases.append(run_case(scene, quiet=quiet or as_json))
+        if not as_json:
+            click.echo("\n".join(cases[-1].lines()))
+        if cases[-1].signal is not None:
+            raise SystemExit(128 + cases[-1].signal)
+    failed, skipped = [case.scene for case in cases if not case.held], len(scenes) - len(judged)
     if as_json:
-        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed)})
+        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed), "skipped": skipped})
     else:
-        click.echo(f"{len(cases)} cases, {len(cases) - len(failed)} held" + (f", failed: {', '.join(failed)}" if failed else ""))
+        click.echo(f"{counted(len(cases), 'case')}, {len(cases) - len(failed)} held"
+                   + (f", {skipped} skipped, which expect nothing" if skipped else "")
+                   + (f", failed: {', '.join(failed)}" if failed else ""))
     if failed:
         raise SystemExit(FAILED)
 
@@ -326,6 +338,11 @@ def refuse_existing(output: Path, overwrite: bool) -> None:
         raise Misuse(f"{output.parent} is no folder; make it first, or give another with -o")
 
 
+def counted(number: int, noun: str) -> str:
+    """`1 frame`, `2 frames`."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
 def say(text: str) -> None:
     click.echo(text, err=True)
 
@@ -343,7 +360,7 @@ def describe(summary: Any) -> str:
     """A summary in lines of name and value."""
     seconds = ", ".join(f"{name} {value:.3f} s" for name, value in summary.seconds.items())
     return "\n".join([
-        f"{summary.output}: {summary.status}, {summary.frames} frames, {summary.simulated_seconds:.6g} s simulated",
+        f"{summary.output}: {summary.status}, {counted(summary.frames, 'frame')}, {summary.simulated_seconds:.6g} s simulated",
         f"  speed             {summary.steps_per_second:,.0f} steps/s, {summary.real_time_factor:,.1f} times real time",
         f"  relaxations       {summary.relaxations:,}",
         f"  contacts          {summary.contacts} at most",
@@ -359,14 +376,16 @@ def stretched(error: float) -> str:
 
 def describe_plan(found: dict[str, Any]) -> Iterable[str]:
     """A plan in lines: phases, groups, buffers, sizes."""
-    yield (f"{found['particles']} particles, {found['distance_constraints']} sticks, {found['frames']} frames of "
-           f"{found['substeps_a_frame']} substeps of {found['step_seconds']:.3g} s")
+    sizes = ", ".join(counted(found[key], noun) for key, noun in (
+        ("particles", "particle"), ("distance_constraints", "stick"), ("frames", "frame")))
+    yield f"{sizes} of {counted(found['substeps_a_frame'], 'substep')} of {found['step_seconds']:.3g} s"
     yield "phases:"
+    wide = max(len(phase["name"]) for phase in found["phases"]) + 2
     for phase in found["phases"]:
-        yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<26}{phase['why']}"
+        yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<{wide}}{phase['why']}"
     yield "groups:"
     for group in found["groups"]:
-        yield (f"  {group['copies']} x {group['kind']} of {group['particles_a_copy']} particles, "
+        yield (f"  {group['copies']} x {group['kind']} of {counted(group['particles_a_copy'], 'particle')}, "
                f"{group['copies_a_block']} a block: {group['lanes']}")
     yield "buffers:"
     for name, size in found["buffers"].items():
@@ -376,10 +395,16 @@ def describe_plan(found: dict[str, Any]) -> Iterable[str]:
 
 
 def fail(error: BaseException, code: int, text: str) -> NoReturn:
-    """End with one message; with --debug, after the traceback."""
+    """End with one message; with --debug after the traceback, with --json as a document too."""
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    say(text)
+    if isinstance(error, click.UsageError):
+        error.show()
+    else:
+        say(text)
+    if "--json" in sys.argv:
+        problems = [problem._asdict() for problem in getattr(error, "problems", ())]
+        print_json({"status": "failed", "exit_code": code, "error": text} | ({"problems": problems} if problems else {}))
     sys.exit(code)
 
 
@@ -393,8 +418,7 @@ def main() -> None:
     except SceneError as error:
         fail(error, WRONG, str(error))
     except click.UsageError as error:
-        error.show()
-        sys.exit(WRONG)
+        fail(error, WRONG, error.format_message())
     except click.ClickException as error:
         fail(error, error.exit_code, f"verlet-numba: {error.format_message()}")
     except (click.Abort, KeyboardInterrupt) as error:

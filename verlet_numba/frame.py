@@ -159,8 +159,7 @@ def advance(world, frames, budget):
                 snapshot.counts[RELAXED] += relax_graph(position, graph, tolerance, approximate)
                 snapshot.counts[RELAXED] += relax_runs_along(position, previous, runs, runs_softness, tolerance,
                                                              approximate, start)                    # P6-P10
-                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate,
-                                                        snapshot.counts)
+                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate)
                 snapshot.counts[RELAXED] += relax_sticks_along(position, previous, sticks, sticks_softness, tolerance,
                                                                approximate, start)
                 snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)

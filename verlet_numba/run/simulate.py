@@ -20,6 +20,7 @@ from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
 from verlet_numba.scene.prepare import Prepared
 
 CHUNK_SECONDS = 0.4         # wall time of a chunk, so that signals and progress stay responsive
+TORN = 1.0                  # constraint error beyond which nothing is left of a body
 COMPLETE, STOPPED, BROKEN = "complete", "stopped", "diverged"
 
 
@@ -35,6 +36,7 @@ class Summary:
     relaxations: int = 0
     contacts: int = 0                       # most of any frame
     constraint_error_max: float = 0.0
+    constraint_error_end: float = 0.0       # of the last frame
     penetration_max: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)      # wall time by phase
     chunks: list[tuple[int, float, float]] = field(default_factory=list)    # frames, seconds simulated, seconds handed over
@@ -49,6 +51,11 @@ class Summary:
     def real_time_factor(self) -> float:
         return self.simulated_seconds / self.seconds["simulate"] if self.seconds.get("simulate") else 0.0
 
+    @property
+    def torn(self) -> bool:
+        """Whether the run, finite though it is, has come apart: some stick ends at more than twice its length."""
+        return self.constraint_error_end > TORN
+
     def timing(self) -> dict[str, Any]:
         """Wall seconds by phase and by chunk."""
         frames, simulate, write = zip(*self.chunks, strict=True) if self.chunks else ((), (), ())
@@ -56,7 +63,8 @@ class Summary:
 
     def as_dict(self) -> dict[str, Any]:
         keys = ("output", "status", "frames", "substeps", "simulated_seconds", "relaxations", "contacts",
-                "constraint_error_max", "penetration_max", "steps_per_second", "real_time_factor", "seconds", "signal")
+                "constraint_error_max", "constraint_error_end", "torn", "penetration_max", "steps_per_second",
+                "real_time_factor", "seconds", "signal")
         return {key: getattr(self, key) for key in keys} | {
             "divergence": self.divergence.as_dict() if self.divergence else None}
 
@@ -146,4 +154,5 @@ def store(model: Model, file: TrajectoryFile, chunk: Frames, sound: int, summary
     summary.relaxations += int(measures[:, RELAXATIONS].sum())
     summary.contacts = max(summary.contacts, int(measures[:, CONTACTS].max()))
     summary.constraint_error_max = max(summary.constraint_error_max, float(measures[:, ERROR_MAX].max()))
+    summary.constraint_error_end = float(measures[-1, ERROR_MAX])
     summary.penetration_max = max(summary.penetration_max, float(measures[:, PENETRATION].max()))

@@ -43,7 +43,7 @@ class Effects(Part):
 
     gravity: Vector | None = Field(
         default=None, description="acceleration of all free particles, m/s^2; [0, 0, -9.81] if the scene has no "
-                                  "`effects` at all, none if it has and this is left out")
+                                  "`effects` at all (an override of another effect keeps it), none if it has and this is left out")
     contact: Literal["auto", "none"] = Field(
         default="auto", description="`auto`: between bodies, colliders and each other wherever the scene has them")
     drag: Drag | None = Field(default=None, description="resistance of the medium")
