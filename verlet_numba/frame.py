@@ -8,6 +8,7 @@ the loop.
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
+from verlet_numba.effects.bending import unbend
 from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -68,7 +69,7 @@ def advance(world, frames, budget):
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features = effects[6:17]
-    friction, restitution, rest, orientation = effects[17:]
+    friction, restitution, rest, orientation, bending = effects[17:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -156,6 +157,7 @@ def advance(world, frames, budget):
                 if not again:
                     choose_lists(position, collided, graph)                 # of the particles moved most (P9)
                     guard(position, previous, runs, sticks, start, snapshot.counts)
+                unbend(again, position, previous, bending)
                 snapshot.counts[RELAXED] += relax_graph(position, graph, tolerance, approximate)
                 snapshot.counts[RELAXED] += relax_runs_along(position, previous, runs, runs_softness, tolerance,
                                                              approximate, start)                    # P6-P10

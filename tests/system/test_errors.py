@@ -37,7 +37,7 @@ PLACES = {"2:21": "frame_rate", "3:20": "substeps", "5:5": "mass", "6:12": "box"
 
 SAMPLES = {     # an override for everything that this version may not do yet
     "solver.deformable_contact": "solver.deformable_contact=exact",
-    "effects.continuous_collision": "effects.continuous_collision=true", "effects.bending": "effects.bending={stiffness: 0.5}",
+    "effects.continuous_collision": "effects.continuous_collision=true",
     "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments"}
 DONE = ("preset=paper", "order=lines", "repeats=once", "response=feature", "projection_point=printed",
         "deformable_contact=spheres", "broad_phase=all_pairs", "gradient=current", "square_root=approximate", "precision=float32")

@@ -24,11 +24,10 @@ class Wind(Part):
 
 
 class Bending(Part):
-    """Resistance of cloth and ropes to bending."""
+    """Resistance of cloth and ropes to bending: angles return to those of the start as critically damped springs."""
 
     stiffness: Fraction = Field(
-        description="part of the angle's error that is removed in a step of the scene's frame rate, whatever the "
-                    "substeps and passes")
+        description="part of an angle's error, from rest, that is removed in a frame, whatever the substeps and passes")
 
 
 class Rest(Part):
