@@ -51,6 +51,7 @@ from verlet_numba.kernels.stopwatch import (
     WEIGHING,
     WIND,
     begin,
+    drop,
     lap,
 )
 
@@ -78,12 +79,14 @@ def advance(world, frames, budget):
                     return PAUSED
                 budget -= 1
                 end = (clock[NUMBER] + 1) * h
+                begin(stopwatch, clock[NUMBER])
                 if clock[SUBSTEP] == substeps - 1:
                     contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
                     keep(position, previous, snapshot, contacts)
-                begin(stopwatch, clock[NUMBER])
+                    lap(stopwatch, FRAMES)
                 settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
                 if idle(rest, moving):                                      # all bodies rest: no work
+                    lap(stopwatch, REST)
                     clock[NUMBER] += 1
                     clock[SUBSTEP] += 1
                     continue
@@ -110,6 +113,7 @@ def advance(world, frames, budget):
                 if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
                         and find_meetings(hulls, meet, rest)
                         and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
+                    drop(stopwatch)
                     return FULL
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, points, mixed,
                             moving):
