@@ -12,7 +12,7 @@ from verlet_numba.study import accuracy_report as report
 from verlet_numba.study import axes
 from verlet_numba.study.accuracy import Point, Study, mark_front, study
 from verlet_numba.study.convergence import distance, horizon, richardson
-from verlet_numba.study.trial import Outcome
+from verlet_numba.study.trial import Outcome, under
 
 G, SPAN = 9.81, 1.0
 PENDULUM = {
@@ -161,6 +161,13 @@ def test_star_has_the_scenes_own_substeps_with_every_choice():
     for substeps in (1, 2, 8):
         scene = loads(json.dumps(PENDULUM | {"solver": {"substeps": substeps}}), "scene.yaml").scene
         assert {"solver.substeps": substeps, "solver.gradient": "step_start"} in axes.star(scene, 40)
+
+
+def test_a_scene_without_effects_keeps_its_gravity_without_contact():
+    bare = loads(json.dumps({key: value for key, value in PENDULUM.items() if key != "effects"}), "scene.yaml")
+    for settings in ({"effects.contact": "none"}, {"effects.damping": 0.1}):
+        assert under(bare, settings, ()).scene.effects.gravity == (0, 0, -9.81)
+    assert under(bare, {"effects.gravity": None}, ()).scene.effects.gravity is None
 
 
 def test_settings_that_are_not_allowed_are_told():
