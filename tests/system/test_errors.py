@@ -109,7 +109,7 @@ def test_a_key_that_is_not_built_yet_in_a_file_has_its_line(verlet, tmp_path):
 @pytest.mark.parametrize(("arguments", "words"), [
     (["simulate"], "simulate"), (["run"], "SCENE"), (["run", "s.yaml", "--thread"], "--threads"),
     (["run", "s.yaml", "--threads", "0"], "--threads"), (["run", "s.yaml", "--frames", "-1"], "--frames"),
-    (["render", "x.vtkhdf"], "--output")])
+    (["render", "."], "--output")])
 def test_wrong_usage(verlet, tmp_path, arguments, words):
     assert words in verlet(*arguments, cwd=tmp_path, code=2).stderr
 

@@ -183,7 +183,8 @@ def test_verify_tells_case_figure_bound_and_verdict(verlet, scenes):
     assert lines == [
         f"{scenes / 'fails.yaml'}: FAILED", "held speed_max to 0.499 s 4.7415 <= 4.9 m/s",
         "FAILED speed_max 4.905 <= 4.9 m/s at 0.5 s", f"{scenes / 'holds.yaml'}: held",
-        "held centre_of_mass of stone from 0.5 s 1.22625 = 1.22625 ± 1e-06 m", f"2 cases, 1 held, failed: {scenes / 'fails.yaml'}"]
+        "held centre_of_mass of stone from 0.5 s 1.22625 = 1.22625 ± 1e-06 m",
+        f"2 cases, 1 held, 1 skipped, which expect nothing, failed: {scenes / 'fails.yaml'}"]
     assert [path.name for path in scenes.parent.iterdir()] == ["scenes"], "nothing is left behind"
 
 
@@ -201,10 +202,10 @@ def test_verify_is_good_where_all_is(verlet, scenes):
 
 def test_scenes_that_expect_nothing_are_skipped_and_not_all_may_be(verlet, tmp_path, scenes):
     (scenes / "fails.yaml").write_text(FALL, encoding="utf-8")
-    assert verlet("verify", scenes).stdout.splitlines()[-1] == "1 case, 1 held, 1 skipped, which expect nothing"
+    assert verlet("verify", scenes).stdout.splitlines()[-1] == "1 case, 1 held, 2 skipped, which expect nothing"
     (scenes / "holds.yaml").unlink()
     told = verlet("verify", scenes, code=2)
-    assert "none of 1 scene in" in told.stderr
+    assert "none of 2 scenes in" in told.stderr
     assert "`expect: [{measure:" in told.stderr
     assert told.stdout == ""
 
