@@ -359,8 +359,9 @@ def print_json(document: Any) -> None:
 def describe(summary: Any) -> str:
     """A summary in lines of name and value."""
     seconds = ", ".join(f"{name} {value:.3f} s" for name, value in summary.seconds.items())
+    status = f"{summary.status}{' but come apart' if summary.torn else ''}"
     return "\n".join([
-        f"{summary.output}: {summary.status}, {counted(summary.frames, 'frame')}, {summary.simulated_seconds:.6g} s simulated",
+        f"{summary.output}: {status}, {counted(summary.frames, 'frame')}, {summary.simulated_seconds:.6g} s simulated",
         f"  speed             {summary.steps_per_second:,.0f} steps/s, {summary.real_time_factor:,.1f} times real time",
         f"  relaxations       {summary.relaxations:,}",
         f"  contacts          {summary.contacts} at most",
