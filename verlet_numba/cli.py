@@ -17,9 +17,10 @@ from verlet_numba._version import __version__
 
 FAILED, WRONG, DIVERGED, RUNS_FAILED, OUT_OF_TIME, INTERRUPTED, TERMINATED = 1, 2, 3, 4, 5, 130, 143
 SCENE = click.argument("scene", type=click.Path(path_type=Path))
+EXISTING = click.Path(exists=True, path_type=Path)
 SETS = click.option("--set", "sets", multiple=True, metavar="PATH=VALUE", help="Override a key, e.g. solver.substeps=16.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-TRAJECTORY = click.argument("trajectory", type=click.Path(path_type=Path))
+TRAJECTORY = click.argument("trajectory", type=EXISTING)
 FRAMES = click.option("--frames", help="Frames to take: numbers and ranges, e.g. 0,10,20 or 0:120:10.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings, no summary.")
@@ -100,16 +101,19 @@ def run(scene: Path, output: Path | None, sets: tuple[str, ...], count: int | No
         print_json(summary.as_dict())
     elif not quiet:
         click.echo(describe(summary))
-    finish(summary, scene)
+    finish(summary, scene, quiet)
 
 
-def finish(summary: Any, scene: Path) -> None:
+def finish(summary: Any, scene: Path, quiet: bool) -> None:
     """Tell why a run has not come to its end, and leave with the exit code that says so."""
-    kept = f"{summary.frames} frames are kept in {summary.output}"
+    kept = f"{counted(summary.frames, 'frame')} kept in {summary.output}"
+    if summary.torn and not quiet:
+        say(f"{scene}: warning: a stick ends {summary.constraint_error_end:.3g} of its length off it: what it belongs to has come "
+            "apart and its frames mean nothing, unless it is compliant or cannot have its length; use more substeps")
     if summary.status == "diverged":
         again = f"diverged in an earlier run of {summary.output}; change the scene, then --overwrite"
-        say(f"{scene}: {summary.divergence or again}. " + (f"{summary.frames} good frames are kept in {summary.output}"
-                                                           if summary.frames else "No frame was good: no file was written"))
+        good = f"{counted(summary.frames, 'good frame')} kept in {summary.output}" if summary.frames else "no file was written"
+        say(f"{scene}: {summary.divergence or again}. {good[0].upper() + good[1:]}")
         raise SystemExit(DIVERGED)
     if summary.status == "stopped":
         cause = "by a signal" if summary.signal else "by --max-time"
@@ -138,7 +142,7 @@ def check(scenes: tuple[Path, ...], sets: tuple[str, ...], quiet: bool) -> None:
         else:
             warn(prepared.warnings, quiet)
             if not quiet:
-                click.echo(f"{scene}: good" + (f", {len(prepared.warnings)} warnings" if prepared.warnings else ""))
+                click.echo(f"{scene}: good" + (f", {counted(len(prepared.warnings), 'warning')}" if prepared.warnings else ""))
     if wrong:
         raise SystemExit(WRONG)
 
@@ -267,7 +271,7 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
 
     prepared = prepare(scene, sets)
     folder = output or Path(default_name(prepared.scene, scene)).with_suffix(".accuracy")
-    if folder.exists() and not overwrite:
+    if folder.exists() and not (folder.is_dir() and (overwrite or not any(folder.iterdir()))):
         raise Misuse(f"{folder} exists already; give another with -o, or --overwrite")
 
     from verlet_numba.study import accuracy_report as report
@@ -275,7 +279,9 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
     from verlet_numba.study.axes import AxisError, parse
 
     try:
-        found = study(prepared.loaded, sets, parse(axes), runs, budget, (lambda text: None) if quiet else say)
+        chosen = parse(axes)
+        folder.mkdir(parents=True, exist_ok=True)           # before the work, not after it
+        found = study(prepared.loaded, sets, chosen, runs, budget, (lambda text: None) if quiet else say)
     except AxisError as error:
         raise Misuse(str(error)) from error
     report.write(found, folder)
@@ -288,11 +294,12 @@ def accuracy(scene: Path, output: Path | None, sets: tuple[str, ...], axes: tupl
     if best is not None and not as_json:
         click.echo(report.solver_yaml(best, prepared.scene.solver.model_dump(exclude_unset=True)))
     if target_error is not None and best is None:
-        raise click.ClickException(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+        say(f"no setting of these is known to have an error of at most {target_error:g} {found.unit}")
+        raise SystemExit(FAILED)
 
 
 @cli.command()
-@click.argument("places", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="FILE_OR_FOLDER...")
+@click.argument("places", type=EXISTING, nargs=-1, required=True, metavar="FILE_OR_FOLDER...")
 @click.option("--measure", "names", multiple=True, metavar="NAME",
               help="A measure to take; may be repeated. [default: all but self_intersections]")
 @click.option("--body", metavar="NAME", help="Measure this body alone, all copies, or the copy NAME.K.")
@@ -415,8 +422,8 @@ def analyze_sweeps(folders: tuple[Path, ...], names: tuple[str, ...], body: str 
 
 
 @cli.command()
-@click.argument("a", type=click.Path(path_type=Path))
-@click.argument("b", type=click.Path(path_type=Path))
+@click.argument("a", type=EXISTING)
+@click.argument("b", type=EXISTING)
 @click.option("--tolerance", type=click.FloatRange(0), default=0.0, show_default=True, help="Differences up to this are none, m.")
 def compare(a: Path, b: Path, tolerance: float) -> None:
     """Find the first frame, body and particle where trajectories A and B differ; exit 0 if there is none, 1 if there is one."""
@@ -429,7 +436,7 @@ def compare(a: Path, b: Path, tolerance: float) -> None:
     if difference is not None:
         click.echo(str(difference))
         raise SystemExit(FAILED)
-    click.echo(f"no difference in {frames} frames" + (f" by more than {tolerance:g} m" if tolerance else ""))
+    click.echo(f"no difference in {counted(frames, 'frame')}" + (f" by more than {tolerance:g} m" if tolerance else ""))
 
 
 @cli.command()
@@ -449,21 +456,28 @@ def verify(places: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
     for scene in scenes:
         if not scene.scene.expect and Path(scene.loaded.source.name) in places:
             raise Misuse(f"{scene.loaded.source.name} states nothing under `expect`")
-    stating, stopped = [scene for scene in scenes if scene.scene.expect], None
+    judged = [scene for scene in scenes if scene.scene.expect]
+    if not judged:
+        raise Misuse(f"none of {counted(len(scenes), 'scene')} in {', '.join(map(str, places))} states anything under `expect`, "
+                     "such as `expect: [{measure: penetration_max, max: 0.01}]`")
     cases: list[Any] = []
+    stopped = None
     with StopSignals() as signals:
-        while len(cases) < len(stating) and not stopped:
-            cases.append(run_case(stating[len(cases)], quiet=quiet or as_json))
+        while len(cases) < len(judged) and not stopped:
+            cases.append(run_case(judged[len(cases)], quiet=quiet or as_json))
             if not as_json:
                 click.echo("\n".join(cases[-1].lines()))
             stopped = cases[-1].signal or signals.number
-    failed = [case.scene for case in cases if not case.held]
+    failed, skipped = [case.scene for case in cases if not case.held], len(scenes) - len(judged)
+    left = len(judged) - len(cases)
     if as_json:
-        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed), "not_run": len(stating) - len(cases)})
+        print_json({"cases": [case.as_dict() for case in cases], "failed": len(failed), "skipped": skipped, "not_run": left})
     else:
-        click.echo(f"{len(cases)} cases, {len(cases) - len(failed)} held" + (f", failed: {', '.join(failed)}" if failed else ""))
+        click.echo(f"{counted(len(cases), 'case')}, {len(cases) - len(failed)} held"
+                   + (f", {skipped} skipped, which expect nothing" if skipped else "")
+                   + (f", failed: {', '.join(failed)}" if failed else ""))
     if stopped:
-        say(f"stopped by a signal; {len(stating) - len(cases)} scenes were not run")
+        say(f"stopped by a signal; {counted(left, 'scene')} not run")
         raise SystemExit(128 + stopped)
     if failed:
         raise SystemExit(FAILED)
@@ -501,6 +515,9 @@ def refuse_existing(output: Path, overwrite: bool, ways: str = "give another wit
 def refuse_format(picture: Path, known: Iterable[str]) -> None:
     if picture.suffix.lower() not in known:
         raise Misuse(f"{picture}: cannot draw {picture.suffix or 'a file without suffix'}; use {', '.join(known)}")
+def counted(number: int, noun: str) -> str:
+    """`1 frame`, `2 frames`."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
 
 
 def say(text: str) -> None:
@@ -519,8 +536,9 @@ def print_json(document: Any) -> None:
 def describe(summary: Any) -> str:
     """A summary in lines of name and value."""
     seconds = ", ".join(f"{name} {value:.3f} s" for name, value in summary.seconds.items())
+    status = f"{summary.status}{' but come apart' if summary.torn else ''}"
     return "\n".join([
-        f"{summary.output}: {summary.status}, {summary.frames} frames, {summary.simulated_seconds:.6g} s simulated",
+        f"{summary.output}: {status}, {counted(summary.frames, 'frame')}, {summary.simulated_seconds:.6g} s simulated",
         f"  speed             {summary.steps_per_second:,.0f} steps/s, {summary.real_time_factor:,.1f} times real time",
         f"  relaxations       {summary.relaxations:,}",
         f"  contacts          {summary.contacts} at most",
@@ -536,14 +554,16 @@ def stretched(error: float) -> str:
 
 def describe_plan(found: dict[str, Any]) -> Iterable[str]:
     """A plan in lines: phases, groups, buffers, sizes."""
-    yield (f"{found['particles']} particles, {found['distance_constraints']} sticks, {found['frames']} frames of "
-           f"{found['substeps_a_frame']} substeps of {found['step_seconds']:.3g} s")
+    sizes = ", ".join(counted(found[key], noun) for key, noun in (
+        ("particles", "particle"), ("distance_constraints", "stick"), ("frames", "frame")))
+    yield f"{sizes} of {counted(found['substeps_a_frame'], 'substep')} of {found['step_seconds']:.3g} s"
     yield "phases:"
+    wide = max(len(phase["name"]) for phase in found["phases"]) + 2
     for phase in found["phases"]:
-        yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<26}{phase['why']}"
+        yield f"  {'active' if phase['active'] else 'absent'}  {phase['name']:<{wide}}{phase['why']}"
     yield "groups:"
     for group in found["groups"]:
-        yield (f"  {group['copies']} x {group['kind']} of {group['particles_a_copy']} particles, "
+        yield (f"  {group['copies']} x {group['kind']} of {counted(group['particles_a_copy'], 'particle')}, "
                f"{group['copies_a_block']} a block: {group['lanes']}")
     yield "buffers:"
     for name, size in found["buffers"].items():
@@ -553,10 +573,16 @@ def describe_plan(found: dict[str, Any]) -> Iterable[str]:
 
 
 def fail(error: BaseException, code: int, text: str) -> NoReturn:
-    """End with one message; with --debug, after the traceback."""
+    """End with one message; with --debug after the traceback, with --json as a document too."""
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    say(text)
+    if isinstance(error, click.UsageError):
+        error.show()
+    else:
+        say(text)
+    if "--json" in sys.argv:
+        problems = [problem._asdict() for problem in getattr(error, "problems", ())]
+        print_json({"status": "failed", "exit_code": code, "error": text} | ({"problems": problems} if problems else {}))
     sys.exit(code)
 
 
@@ -571,8 +597,7 @@ def main() -> None:
     except SceneError as error:
         fail(error, WRONG, str(error))
     except click.UsageError as error:
-        error.show()
-        sys.exit(WRONG)
+        fail(error, WRONG, error.format_message())
     except click.ClickException as error:
         fail(error, error.exit_code, f"verlet-numba: {error.format_message()}")
     except (click.Abort, KeyboardInterrupt) as error:

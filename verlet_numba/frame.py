@@ -8,6 +8,7 @@ the loop.
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
+from verlet_numba.effects.bending import unbend
 from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
@@ -50,6 +51,7 @@ from verlet_numba.kernels.stopwatch import (
     WEIGHING,
     WIND,
     begin,
+    drop,
     lap,
 )
 
@@ -68,7 +70,7 @@ def advance(world, frames, budget):
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features = effects[6:17]
-    friction, restitution, rest, orientation = effects[17:]
+    friction, restitution, rest, orientation, bending = effects[17:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -77,12 +79,14 @@ def advance(world, frames, budget):
                     return PAUSED
                 budget -= 1
                 end = (clock[NUMBER] + 1) * h
+                begin(stopwatch, clock[NUMBER])
                 if clock[SUBSTEP] == substeps - 1:
                     contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
                     keep(position, previous, snapshot, contacts)
-                begin(stopwatch, clock[NUMBER])
+                    lap(stopwatch, FRAMES)
                 settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
                 if idle(rest, moving):                                      # all bodies rest: no work
+                    lap(stopwatch, REST)
                     clock[NUMBER] += 1
                     clock[SUBSTEP] += 1
                     continue
@@ -109,6 +113,7 @@ def advance(world, frames, budget):
                 if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
                         and find_meetings(hulls, meet, rest)
                         and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
+                    drop(stopwatch)
                     return FULL
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, points, mixed,
                             moving):
@@ -156,11 +161,11 @@ def advance(world, frames, budget):
                 if not again:
                     choose_lists(position, collided, graph)                 # of the particles moved most (P9)
                     guard(position, previous, runs, sticks, start, snapshot.counts)
+                unbend(again, position, previous, bending)
                 snapshot.counts[RELAXED] += relax_graph(position, graph, tolerance, approximate)
                 snapshot.counts[RELAXED] += relax_runs_along(position, previous, runs, runs_softness, tolerance,
                                                              approximate, start)                    # P6-P10
-                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate,
-                                                        snapshot.counts)
+                snapshot.counts[RELAXED] += relax_lines(position, inverse_mass, lines, lines_softness, tolerance, approximate)
                 snapshot.counts[RELAXED] += relax_sticks_along(position, previous, sticks, sticks_softness, tolerance,
                                                                approximate, start)
                 snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)

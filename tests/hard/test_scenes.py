@@ -16,9 +16,10 @@ LONG = ("b17", "b18", "b19", "b20", "b27", "b28", "b40", "b41", "b45")
 
 NOT_HELD = {
     "b01_rope_with_a_weight": ({"constraint_error_max"}, "stretches by 8.8 %: one pass of 50 substeps is not enough"),
-    "b02_heavy_on_light": ({"centre_of_mass", "speed_max"}, "the heavy box is thrown off after 2 s, with 64 substeps after 4 s"),
-    "b27_stack": ({"speed_max"}, "stands within 0.1 mm, but moves at 5.3 cm/s for a moment after 55 s"),
-    "b28_pyramid": ({"speed_max"}, "stands, its top within 0.04 %, but still moves at 7.6 cm/s after 10 s"),
+    "b02_heavy_on_light": ({"centre_of_mass.x", "centre_of_mass.y", "centre_of_mass.z", "speed_max"},
+                           "the heavy box is thrown off after 1.4 s, with 64 substeps after 4 s"),
+    "b27_stack": ({"speed_max"}, "stands, 9.9 mm aside, but moves at 5.1 cm/s for a moment after 14 s"),
+    "b28_pyramid": ({"speed_max"}, "stands, its top 5 mm aside, but still moves at 8.1 cm/s after 10 s"),
     "b45_rocking": ({"potential_energy"}, "the crate falls asleep on its edge, 14 cm too high, at the turn of its swing"),
 }
 """What the present version cannot hold: these measures and no others, with their figures; docs/hard_cases.md lists them too."""
@@ -46,6 +47,7 @@ def test_case_is_held(scene):
     ("b05_overlaps", "bodies.b90.velocity=[-2, 0, 0]", "speed_max"),
     ("b12_redundant_constraints", "bodies.more.sticks.0=[0, 1, 1.01]", "constraint_error_max"),
     ("b15_exact_touch", "bodies.high.position.2=0.61", "speed_max"),
+    ("b15_exact_touch", "bodies.beside.velocity=[0, 0.1, 0]", "centre_of_mass.y"),
     ("b24_nothing_moves", "bodies.rope.velocity=[1.0e-13, 0, 0]", "centre_of_mass"),
     ("b31_slope", "bodies.above.friction=0.56", "speed_max"),
     ("b33_chain", "bodies.link2.radius=0.001", "centre_of_mass"),

@@ -37,7 +37,7 @@ PLACES = {"2:21": "frame_rate", "3:20": "substeps", "5:5": "mass", "6:12": "box"
 
 SAMPLES = {     # an override for everything that this version may not do yet
     "solver.deformable_contact": "solver.deformable_contact=exact",
-    "effects.continuous_collision": "effects.continuous_collision=true", "effects.bending": "effects.bending={stiffness: 0.5}",
+    "effects.continuous_collision": "effects.continuous_collision=true",
     "bodies.*.contact_geometry": "bodies.0.contact_geometry=segments"}
 DONE = ("preset=paper", "order=lines", "repeats=once", "response=feature", "projection_point=printed",
         "deformable_contact=spheres", "broad_phase=all_pairs", "gradient=current", "square_root=approximate", "precision=float32")
@@ -74,7 +74,8 @@ def test_every_mistake_of_a_scene_at_once(verlet, tmp_path, command):
 
 @pytest.mark.parametrize(("override", "column", "words"), [
     ("solver.substep=3", 8, "did you mean 'substeps'"), ("solver", 1, "PATH=VALUE"), ("bodies.pendlum.name=x", 8, "pendulum"),
-    ("bodies.3.name=x", 8, "has 1"), ("solver.substeps=[", 18, "not YAML"), ("solver.substeps=-1", 17, "at least 1")])
+    ("bodies.3.name=x", 8, "has 1"), ("bodies.nobody.name=x", 8, "there are pendulum"),
+    ("solver.substeps=[", 18, "not YAML"), ("solver.substeps=-1", 17, "at least 1")])
 def test_wrong_overrides(verlet, write_scene, override, column, words):
     line = one_line(verlet("check", write_scene(bodies=[PENDULUM]), "--set", override, code=2))
     assert line.startswith(f"--set {override}:1:{column}: ")
@@ -108,7 +109,7 @@ def test_a_key_that_is_not_built_yet_in_a_file_has_its_line(verlet, tmp_path):
 @pytest.mark.parametrize(("arguments", "words"), [
     (["simulate"], "simulate"), (["run"], "SCENE"), (["run", "s.yaml", "--thread"], "--threads"),
     (["run", "s.yaml", "--threads", "0"], "--threads"), (["run", "s.yaml", "--frames", "-1"], "--frames"),
-    (["render", "x.vtkhdf"], "--output")])
+    (["render", "."], "--output")])
 def test_wrong_usage(verlet, tmp_path, arguments, words):
     assert words in verlet(*arguments, cwd=tmp_path, code=2).stderr
 
@@ -127,15 +128,43 @@ def test_scenes_that_are_no_text(verlet, tmp_path):
 def test_files_that_are_no_trajectory(verlet, mixed, tmp_path):
     (tmp_path / "garbage").write_bytes(bytes(range(256)) * 20)
     (tmp_path / "half").write_bytes(mixed.trajectory.read_bytes()[:50_000])
-    for name in ("missing", "garbage", "half", "."):
+    assert "'missing' does not exist" in verlet("render", "missing", "-o", "x.png", cwd=tmp_path, code=2).stderr
+    for name in ("garbage", "half", "."):
         line = one_line(verlet("render", name, "-o", "x.png", cwd=tmp_path, code=1))
         assert line.startswith(f"verlet-numba: {name}: ")
     assert not (tmp_path / "x.png").exists()
 
 
+@pytest.mark.parametrize(("arguments", "code", "words", "problems"), [
+    (["run", "wrong.yaml", "--json"], 2, "frame_rat", 6), (["plan", "--json"], 2, "SCENE", 0),
+    (["analyze", "none", "--json"], 2, "none", 0), (["analyze", "wrong.yaml", "--json"], 1, "no HDF5", 0)])
+def test_errors_are_a_document_too(verlet, tmp_path, arguments, code, words, problems):
+    """With --json, one on stdout beside the words on stderr."""
+    (tmp_path / "wrong.yaml").write_text(WRONG, encoding="utf-8")
+    done = verlet(*arguments, cwd=tmp_path, code=code)
+    told = json.loads(done.stdout)
+    assert (told["status"], told["exit_code"], len(told.get("problems", []))) == ("failed", code, problems)
+    assert words in told["error"]
+    assert words in done.stderr
+    assert all({"file", "line", "column", "path", "message"} == set(each) for each in told.get("problems", []))
+
+
+def test_what_has_come_apart_but_stayed_finite_is_told(verlet, write_scene, tmp_path):
+    """A stick between pins that are carried eight of its lengths apart."""
+    body = {**PENDULUM, "pinned": [0], "path": [[0, 0, 0, 0], [0.1, 9, 0, 0]]}
+    held = {"kind": "particles", "name": "post", "positions": [[1, 0, 0]], "masses": [1], "pinned": [0]}
+    scene = write_scene(time={"duration": 0.2}, bodies=[body, held], attachments=[["pendulum", 1, "post", 0]])
+    done = verlet("run", scene, "-o", "x.vtkhdf", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)
+    assert told["torn"]
+    assert told["constraint_error_end"] > 1
+    assert "has come apart" in done.stderr
+
+
 def test_debug_shows_the_traceback_and_keeps_the_exit_code(verlet, tmp_path):
+    (tmp_path / "garbage").write_bytes(bytes(100))
     for arguments, code, error in ((["run", "missing"], 2, "SceneError"),
-                                   (["render", "missing", "-o", "x.png"], 1, "TrajectoryError")):
+                                   (["render", "garbage", "-o", "x.png"], 1, "TrajectoryError")):
         shown = verlet("--debug", *arguments, cwd=tmp_path, code=code).stderr
         assert "Traceback" in shown
         assert error in shown
@@ -202,7 +231,7 @@ def test_signals_end_a_run_with_its_file_finished(write_scene, tmp_path, number)
     assert "Traceback" not in errors
     status, count = readable(output)
     assert status == "stopped"
-    assert f"{count} frames are kept in {output}" in errors
+    assert f"{count} frames kept in {output}" in errors
     assert f"stopped, {count} frames" in told
     assert count < 6_000_000
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "x.vtkhdf", "x.vtkhdf.checkpoint"]

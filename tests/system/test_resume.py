@@ -66,7 +66,7 @@ def test_a_command_with_a_short_time_is_repeated_until_it_is_done(verlet, write_
     scene = write_scene(bodies=[PENDULUM])
     command = ["run", scene, "-o", "x.vtkhdf", "--resume", "--max-time", 0.001, "--json"]
     done = verlet(*command, cwd=tmp_path, code=5)
-    assert "stopped by --max-time; 1 frames are kept in x.vtkhdf, and --resume goes on" in done.stderr
+    assert "stopped by --max-time; 1 frame kept in x.vtkhdf, and --resume goes on" in done.stderr
     assert (json.loads(done.stdout)["status"], json.loads(done.stdout)["signal"]) == ("stopped", None)
     assert files(tmp_path) == ["x.vtkhdf", "x.vtkhdf.checkpoint"]
     verlet(*command, cwd=tmp_path, code=5)

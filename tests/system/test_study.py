@@ -117,7 +117,8 @@ def test_plot_draws_the_course(verlet, mixed, tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
-    ([], 2, "FILE_OR_FOLDER"), (["none.vtkhdf"], 1, "no such file"), (["."], 1, "no trajectory file"), (["x.txt"], 1, "no HDF5"),
+    ([], 2, "FILE_OR_FOLDER"), (["none.vtkhdf"], 2, "'none.vtkhdf' does not exist"),
+    (["."], 1, "no trajectory file"), (["x.txt"], 1, "no HDF5"),
     (["MIXED", "--plot", "x.jpg"], 2, ".png"), (["MIXED", "--measure", "momentun"], 2, "no measure 'momentun'"),
     (["MIXED", "--body", "crat"], 2, "no body 'crat'"), (["MIXED", "--body", "crate", "--measure", "contacts"], 2, "whole scene"),
     (["MIXED", "--csv", "none/x.csv"], 2, "none")])
@@ -165,7 +166,7 @@ def test_compare_finds_what_differs(verlet, mixed, tmp_path):
 
 
 @pytest.mark.parametrize(("files", "code", "words"), [
-    (["none", "MIXED"], 1, "no such file"), (["MIXED", "x.txt"], 1, "no HDF5"), (["MIXED"], 2, "B"),
+    (["none", "MIXED"], 2, "'none' does not exist"), (["MIXED", "x.txt"], 1, "no HDF5"), (["MIXED"], 2, "B"),
     (["MIXED", "MIXED", "--tolerance", "-1"], 2, "tolerance")])
 def test_compare_says_what_it_cannot(verlet, mixed, tmp_path, files, code, words):
     (tmp_path / "x.txt").write_text("x", encoding="utf-8")
@@ -182,12 +183,14 @@ def test_verify_tells_case_figure_bound_and_verdict(verlet, scenes):
     assert lines == [
         f"{scenes / 'fails.yaml'}: FAILED", "held speed_max to 0.499 s 4.7415 <= 4.9 m/s",
         "FAILED speed_max 4.905 <= 4.9 m/s at 0.5 s", f"{scenes / 'holds.yaml'}: held",
-        "held centre_of_mass of stone from 0.5 s 1.22625 = 1.22625 ± 1e-06 m", f"2 cases, 1 held, failed: {scenes / 'fails.yaml'}"]
+        "held centre_of_mass of stone from 0.5 s 1.22625 = 1.22625 ± 1e-06 m",
+        f"2 cases, 1 held, 1 skipped, which expect nothing, failed: {scenes / 'fails.yaml'}"]
     assert [path.name for path in scenes.parent.iterdir()] == ["scenes"], "nothing is left behind"
 
 
 def test_verify_is_good_where_all_is(verlet, scenes):
     told = json.loads(verlet("verify", scenes / "holds.yaml", "--json").stdout)
+    assert told["skipped"] == 0
     assert told["failed"] == 0
     case = told["cases"][0]
     assert (case["verdict"], case["trouble"]) == ("held", "")
@@ -195,6 +198,16 @@ def test_verify_is_good_where_all_is(verlet, scenes):
         "measure": "centre_of_mass", "equal": 1.22625, "tolerance": 1e-6, "from": 0.5, "body": "stone", "verdict": "held",
         "figure": 0, "time": 0.5, "reason": ""}
     assert case["expectations"][0]["figure"] == pytest.approx(1.22625, abs=1e-9)
+
+
+def test_scenes_that_expect_nothing_are_skipped_and_not_all_may_be(verlet, tmp_path, scenes):
+    (scenes / "fails.yaml").write_text(FALL, encoding="utf-8")
+    assert verlet("verify", scenes).stdout.splitlines()[-1] == "1 case, 1 held, 2 skipped, which expect nothing"
+    (scenes / "holds.yaml").unlink()
+    told = verlet("verify", scenes, code=2)
+    assert "none of 2 scenes in" in told.stderr
+    assert "`expect: [{measure:" in told.stderr
+    assert told.stdout == ""
 
 
 def test_a_divergence_is_a_failed_case(verlet, tmp_path, scenes):

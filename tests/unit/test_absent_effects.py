@@ -19,7 +19,7 @@ OCCURS = {
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
     "relax_graph.sort_bodies": {"graph", "collided"}, "relax_lines.solve": {"lines"}, "relax_started.part": {"start"},
     "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"},
-    "orientation.volume": {"orientation"}, "stopwatch.reading": {"stopwatch"}}
+    "orientation.volume": {"orientation"}, "hinge.gradients": {"bending"}, "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
@@ -35,8 +35,8 @@ WHOLE = {"rigid", "touches"}
 CONSTRAINTS = {"paper": {"graph", "collided"}, "chains": {"lines"}, "step start": {"start"}}
 """Parts of the world, beside effects, that scenes have."""
 SCENES = {
-    "everything": (worlds.EVERYTHING, EFFECTS - {"features"}),
-    "paper": (worlds.PAPER, EFFECTS - WHOLE - {"orientation"}),
+    "everything": (worlds.EVERYTHING, EFFECTS - {"features", "bending"}),
+    "paper": (worlds.PAPER, EFFECTS - WHOLE - {"orientation", "bending"}),
     "colliders at rest": (worlds.with_changes(worlds.EVERYTHING, effects=CALM, bodies=BARE, colliders=STILL, output={"fields": []}),
                           {"gravity", "contact", "orientation", *MEET, *MIX, *WHOLE}),
     "a crate on the floor": (worlds.FREE | {"bodies": [*worlds.FREE["bodies"][1:], *RIGID], "colliders": [{"kind": "plane"}],
@@ -45,6 +45,8 @@ SCENES = {
     "free flight": (worlds.FREE, {"gravity", *SOFT}),
     "no effects": (worlds.with_changes(worlds.FREE, effects={"gravity": None}), SOFT),
     "chains": (worlds.CHAINS, {"gravity"}),
+    "bending": (worlds.with_changes(worlds.CHAINS, effects={"bending": {"stiffness": 0.5}}, solver={"order": "sequential"}),
+                {"gravity", "bending"}),
     "step start": (worlds.with_changes(worlds.FREE, solver={"gradient": "step_start"}, effects={"contact": "none"}), {"gravity"}),
     "no contact": (worlds.with_changes(worlds.FREE, effects={"contact": "none"}), {"gravity"})}
 

@@ -31,6 +31,7 @@ SCENES = {
     "paper": worlds.PAPER,
     "chains": worlds.CHAINS,
     "step start": worlds.with_changes(worlds.EVERYTHING, solver={"gradient": "step_start"}),
+    "bending": worlds.with_changes(worlds.CHAINS, effects={"bending": {"stiffness": 0.5}}),
     "empty": {"time": {"duration": 1}, "effects": {}},
     "meshes": worlds.with_changes(worlds.EVERYTHING, colliders=[
         {"kind": "mesh", "file": str(Path(__file__).parents[2] / "scenes/gallery/bowl.obj")}, {"kind": "plane"}]),

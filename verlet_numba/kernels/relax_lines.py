@@ -13,8 +13,7 @@ short (rows of a single cloth) the system is turned: its columns become rows.
 The solve is one step of Newton's method. A stick that changes by d is left about d.d / (2 rest^2) too long: chains in which that
 is more than the family's `settled` are solved again. So a heavy weight may swing on a light rope, which it draws so tight that
 the step does not resolve its waves. Rows of cloth, which the next family spoils again, gain nothing. Where a stick would change
-by more than TURN of its length, the linear system says nothing about what happens: that chain is relaxed stick by stick instead,
-and counted.
+by more than TURN of its length, the linear system says nothing about what happens: that chain is relaxed stick by stick instead.
 """
 
 import math
@@ -22,7 +21,6 @@ import math
 import numpy as np
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FALLEN
 from verlet_numba.kernels.relax import share_of
 from verlet_numba.physics.distance import excess, stretch_approximate
 
@@ -33,7 +31,7 @@ TILE = 8            # numbers of a line of the cache, in double precision
 
 
 @kernel
-def relax_lines(position, inverse_mass, lines, softness, tolerance, approximate, counts):
+def relax_lines(position, inverse_mass, lines, softness, tolerance, approximate):
     """Relax every chain once, family by family. Returns the number of constraints in the chains that were relaxed."""
     if lines is None:
         return 0
@@ -64,7 +62,7 @@ def relax_lines(position, inverse_mass, lines, softness, tolerance, approximate,
             if unsettled:
                 mark(s, n, rest, diagonal, coupling, moved, marks, lines.settled[r])
             if wild:
-                counts[FALLEN] += let_go(diagonal, coupling, marks, pull, n)
+                lines.singly[0] += let_go(diagonal, coupling, marks, pull, n)
                 weigh(inverse_mass, i, s, n, vector, pull, moved)
             shift(position, moved, i, s, n)
             tense(softness, d, n, diagonal, vector, pull)

@@ -11,6 +11,7 @@ PHASES = ("rest", "gravity", "wind", "drag", "damping", "integration", "paths", 
 (REST, GRAVITY, WIND, DRAG, DAMPING, INTEGRATION, PATHS, FINDING, WEIGHING, ANSWERING, RELAXATION, REBOUND,
  FRAMES) = range(len(PHASES))
 
+
 @kernel
 def reading(clock, spec):
     """A clock [ns]; spec (2,): its seconds and nanoseconds (POSIX clock_gettime)."""
@@ -39,6 +40,15 @@ def lap(stopwatch, phase):
         stopwatch.spent[phase] += now - stopwatch.last[0]
         stopwatch.laps[phase] += 1
         stopwatch.last[0] = now
+
+
+@kernel
+def drop(stopwatch):
+    """A substep breaks off, and what follows is not its work: it is not timed."""
+    if stopwatch is None:
+        return
+    stopwatch.sampled[0] -= stopwatch.running[0]
+    stopwatch.running[0] = 0
 
 
 @kernel

@@ -32,6 +32,16 @@ def any_normal(x, y, z):
 
 
 @formula
+def between(ux, uy, uz, vx, vy, vz):
+    """The angle between two arms [rad], as `bend` has it."""
+    ux, uy, uz, _ = unit(ux, uy, uz)
+    vx, vy, vz, _ = unit(vx, vy, vz)
+    cosine = ux * vx + uy * vy + uz * vz
+    _, _, _, sine = unit(vx - cosine * ux, vy - cosine * uy, vz - cosine * uz)
+    return math.atan2(sine, cosine)
+
+
+@formula
 def bend(ux, uy, uz, vx, vy, vz, rest, slack, w_i, w_j, w_k):
     """Displacements of x_i and x_k [m] that bring the angle to `rest` [rad] to first order, and what x_j moves.
 

@@ -7,6 +7,7 @@ from verlet_numba.buffers import CONTACTS, ERROR_MAX, PENETRATION, RELAXATIONS, 
 from verlet_numba.run.postmortem import Divergence
 from verlet_numba.scene.schema import Scene
 
+TORN = 1.0                  # constraint error beyond which nothing is left of a body
 COMPLETE, STOPPED, BROKEN = "complete", "stopped", "diverged"
 
 
@@ -22,6 +23,7 @@ class Summary:
     relaxations: int = 0
     contacts: int = 0                       # most of any frame
     constraint_error_max: float = 0.0
+    constraint_error_end: float = 0.0       # of the last frame
     penetration_max: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)      # wall time by phase
     chunks: list[tuple[int, float, float]] = field(default_factory=list)    # frames, seconds simulated, seconds handed over
@@ -37,6 +39,11 @@ class Summary:
     def real_time_factor(self) -> float:
         return self.simulated_seconds / self.seconds["simulate"] if self.seconds.get("simulate") else 0.0
 
+    @property
+    def torn(self) -> bool:
+        """Whether the run, finite though it is, has come apart: some stick ends at more than twice its length."""
+        return self.constraint_error_end > TORN
+
     def spend(self, phase: str, seconds: float) -> None:
         self.seconds[phase] = self.seconds.get(phase, 0.0) + seconds
 
@@ -48,6 +55,7 @@ class Summary:
         self.relaxations += int(measures[:, RELAXATIONS].sum())
         self.contacts = max(self.contacts, int(measures[:, CONTACTS].max()))
         self.constraint_error_max = max(self.constraint_error_max, float(measures[:, ERROR_MAX].max()))
+        self.constraint_error_end = float(measures[-1, ERROR_MAX])
         self.penetration_max = max(self.penetration_max, float(measures[:, PENETRATION].max()))
 
     def timing(self) -> dict[str, Any]:
@@ -59,7 +67,7 @@ class Summary:
         """For JSON: all but the chunks, and the two rates."""
         told = asdict(self)
         del told["chunks"]
-        return told | {"steps_per_second": self.steps_per_second, "real_time_factor": self.real_time_factor}
+        return told | {"torn": self.torn, "steps_per_second": self.steps_per_second, "real_time_factor": self.real_time_factor}
 
     def so_far(self) -> dict[str, Any]:
         """What a later process needs to go on counting."""

@@ -23,6 +23,7 @@ from verlet_numba.buffers import (
     gate,
 )
 from verlet_numba.scene import forces
+from verlet_numba.scene.bending import bending_of
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import carried
 from verlet_numba.scene.constraint_graph import graph_of
@@ -110,7 +111,8 @@ def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
                    forces.drag(scene.effects, inverse_mass, real),
                    forces.damping(scene.effects, inverse_mass, step),
                    carried(bodies, numbering), *contact,
-                   orientation_of(bodies, numbering) if scene.solver.orientation_guard else None)
+                   orientation_of(bodies, numbering) if scene.solver.orientation_guard else None,
+                   bending_of(scene, bodies, numbering, inverse_mass))
 
 
 def state(size: int, inverse_mass: Floats, effects: Effects, real: Any) -> tuple[Particles, Snapshot]:

@@ -45,7 +45,7 @@ def lines_of(bodies: list[Body], numbering: Numbering, inverse_mass: Floats, ste
             (3, max(1, lanes[rows > 0].max(initial=0)))]
     settled = gate(np.where(woven, *SETTLED), np.float64)
     buffers = [*(gate(values, np.int64) for values in whole_numbers), settled, *(gate(values, real) for values in reals),
-               *(gate(np.zeros(size), real) for size in room), gate(np.zeros(lanes.max()), np.int64)]
+               *(gate(np.zeros(size), real) for size in room), *(gate(np.zeros(size), np.int64) for size in (lanes.max(), 1))]
     if not parts.compliance.any():
         return Lines(*buffers), None
     return Lines(*buffers), Softness(gate(share, real), gate(np.zeros(len(share)), real))

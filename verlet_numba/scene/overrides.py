@@ -1,7 +1,8 @@
 """`--set PATH=VALUE`: values laid over a document before it is validated.
 
 PATH is dotted: keys of mappings, indices of lists, names of bodies and colliders. VALUE is YAML. Mappings that are not
-there are made. The document itself stays as it is: what lies along the path is copied.
+there are made; one that stands for something when it is left out, as `effects` does for gravity, starts as that. The
+document itself stays as it is: what lies along the path is copied.
 """
 
 from collections.abc import Sequence
@@ -10,8 +11,11 @@ from typing import Any
 
 from .messages import did_you_mean
 from .problems import Path, Problem, SceneError, dotted
-from .schema_common import entry_name
+from .schema import Scene
+from .schema_common import Part, entry_name
 from .source import MappingMarks, Marks, Override, Source, compose, pack, unpack
+
+SHOWN = 10          # names, at most, where one is not known
 
 
 def override(source: Source, sets: Sequence[str]) -> tuple[Source, list[Problem]]:
@@ -92,7 +96,7 @@ def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[A
     key: str | int = step.word
     if node is None:
         inner, laid = _lay(None, rest, (), given)
-        made = {step.word: inner}
+        made = {**left_out(done), step.word: inner}
         return made, _Laid(done, made, MappingMarks(step.position, {step.word: step.position}, {step.word: laid.marks}))
     if isinstance(node, list):
         key = _index(node, step, done)
@@ -106,6 +110,12 @@ def _lay(node: Any, steps: Sequence[_Step], done: Path, given: _Laid) -> tuple[A
     return copy, replace(laid, position=step.position) if len(laid.path) == len(done) + 1 else laid
 
 
+def left_out(path: Path) -> dict[str, Any]:
+    """What a mapping at this path stands for where a scene leaves it out, beside the defaults of its own keys."""
+    default = Scene.model_fields[path[0]].default if len(path) == 1 and path[0] in Scene.model_fields else None
+    return default.model_dump(mode="json", exclude_unset=True) if isinstance(default, Part) else {}
+
+
 def _index(entries: list[Any], step: _Step, done: Path) -> int:
     """The index of a list's entry, given by number or, for bodies and colliders, by name."""
     if step.word.isascii() and step.word.isdigit():
@@ -116,5 +126,6 @@ def _index(entries: list[Any], step: _Step, done: Path) -> int:
     if done in (("bodies",), ("colliders",)) and step.word in names:
         return names.index(step.word)
     known = [name for name in names if name is not None] if done in (("bodies",), ("colliders",)) else []
-    numbers = f"; its entries are 0 to {len(entries) - 1}" if entries else "; the list is empty"
+    there = f"; there are {', '.join(known[:SHOWN])}{' ...' if len(known) > SHOWN else ''}" if known else "; the list is empty"
+    numbers = f"; its entries are 0 to {len(entries) - 1}" if entries and not known else there
     raise step.failure(done, "there is no such entry" + (did_you_mean(step.word, known) or numbers))

@@ -94,8 +94,9 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("motion of colliders", active.moving is not None,
                 "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
     yield from contacts(prepared, model)
-    for name in ("continuous collision", "bending"):
-        yield Phase(name, False, "not simulated yet")
+    yield Phase("continuous collision", False, "not simulated yet")
+    yield Phase("bending", active.bending is not None, unnamed if effects.bending is None else named if active.bending else
+                "named, but there is neither cloth nor a rope of two segments" if effects.bending.stiffness else nothing)
     yield Phase("orientation guard", active.orientation is not None,
                 "not asked for by solver.orientation_guard" if not scene.solver.orientation_guard else
                 "solver.orientation_guard" if active.orientation else "no rigid body that has a volume and no pins")

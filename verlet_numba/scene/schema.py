@@ -12,10 +12,13 @@ from .schema_effects import Effects
 
 Count = Annotated[Integer, Field(ge=1, le=100_000)]
 Seconds = Annotated[Number, Field(ge=0, le=1e9)]
-Measure = Literal[
+Recorded = Literal[
     "kinetic_energy", "potential_energy", "total_energy", "momentum", "angular_momentum", "centre_of_mass",
     "constraint_error_max", "constraint_error_rms", "penetration_max", "contacts", "relaxations", "fallbacks",
-    "resting", "speed_max", "rest_time", "orientation_flips", "self_intersections", "outside"]
+    "resting", "speed_max"]
+Measure = Literal[Recorded, "rest_time", "orientation_flips", "self_intersections", "outside"]
+Component = Literal["momentum.x", "momentum.y", "momentum.z", "angular_momentum.x", "angular_momentum.y", "angular_momentum.z",
+                    "centre_of_mass.x", "centre_of_mass.y", "centre_of_mass.z"]
 
 COUNTED = ("contacts", "relaxations", "fallbacks", "resting")
 """Measures that a run counts for the whole scene."""
@@ -109,7 +112,8 @@ class Output(Part):
 class Expect(Part):
     """A bound that a measure has to keep in every frame of [from, to]; exactly one of max, min, equal."""
 
-    measure: Measure = Field(description="what is measured; of vectors their length")
+    measure: Literal[Measure, Component] = Field(
+        description="what is measured; of vectors their length, with .x, .y or .z behind the name that component")
     max: Number | None = Field(default=None, description="upper bound, in the measure's unit")
     min: Number | None = Field(default=None, description="lower bound, in the measure's unit")
     equal: Number | None = Field(default=None, description="value, in the measure's unit")
@@ -133,7 +137,8 @@ class Expect(Part):
 class Reference(Part):
     """A closed form that `accuracy` measures error against."""
 
-    measure: Measure = Field(description="what is measured at the end of the run")
+    measure: Literal[Recorded, Component, "rest_time"] = Field(
+        description="what is measured at the end of the run; of vectors their length, or a component as in `expect`")
     value: Number = Field(description="its true value, in the measure's unit")
     source: str = Field(default="", description="where the value comes from", max_length=10_000)
 

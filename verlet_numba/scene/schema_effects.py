@@ -24,11 +24,10 @@ class Wind(Part):
 
 
 class Bending(Part):
-    """Resistance of cloth and ropes to bending."""
+    """Resistance of cloth and ropes to bending: angles return to those of the start as critically damped springs."""
 
     stiffness: Fraction = Field(
-        description="part of the angle's error that is removed in a step of the scene's frame rate, whatever the "
-                    "substeps and passes")
+        description="part of an angle's error, from rest, that is removed in a frame, whatever the substeps and passes")
 
 
 class Rest(Part):
@@ -43,7 +42,7 @@ class Effects(Part):
 
     gravity: Vector | None = Field(
         default=None, description="acceleration of all free particles, m/s^2; [0, 0, -9.81] if the scene has no "
-                                  "`effects` at all, none if it has and this is left out")
+                                  "`effects` at all (an override of another effect keeps it), none if it has and this is left out")
     contact: Literal["auto", "none"] = Field(
         default="auto", description="`auto`: between bodies, colliders and each other wherever the scene has them")
     drag: Drag | None = Field(default=None, description="resistance of the medium")

@@ -12,6 +12,7 @@ import numpy as np
 
 from verlet_numba.scene.body import Body, Floats, Shape
 from verlet_numba.scene.clearance import planes
+from verlet_numba.scene.falling import box_about, landing_speeds
 from verlet_numba.scene.problems import Path as Key
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.schema_colliders import Collider
@@ -34,20 +35,28 @@ def slipping(scene: Scene, bodies: list[Body]) -> Warnings:
 
 
 def too_fast_for_colliders(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Bodies whose first substep may take them past a collider."""
+    """Bodies that a substep may take past a collider, the first one or that in which they come down on it."""
     thin = [(collider, *_thickness(collider)) for collider in scene.colliders if collider.kind in _THICKNESS]
-    for index, body in enumerate(bodies if thin else []):
-        speed, own = top_speed(body), width(body.shape)
-        for collider, thickness, own_speed in thin:
+    if not thin:
+        return
+    speeds = np.array([top_speed(body) for body in bodies])
+    landing = landing_speeds(scene, bodies, speeds, np.stack([box_about(collider) for collider, *_ in thin]))
+    for index, body in enumerate(bodies):
+        own = width(body.shape)
+        for number, (collider, thickness, own_speed) in enumerate(thin):
             limit = (thickness + own) / 2 if body.shape.rigid else thickness + own
-            reach = (speed + own_speed) / substeps_a_second(scene)
+            reach = (max(speeds[index], landing[index, number]) + own_speed) / substeps_a_second(scene)
             if reach > limit:
-                yield ("bodies", index), _too_fast(scene, reach, limit, f"collider {collider.name}")
+                falls = bool((speeds[index] + own_speed) / substeps_a_second(scene) <= limit)
+                yield ("bodies", index), _too_fast(scene, reach, limit, f"collider {collider.name}", falls)
                 break
 
 
 def too_fast_for_bodies(scene: Scene, bodies: list[Body]) -> Warnings:
-    """Bodies whose first substep may take them past another one; of two the faster is warned of."""
+    """Bodies that a substep may take past another one, the first one or that in which they come down on it.
+
+    Of two the faster is warned of, or that which falls; on another that falls as well nothing falls.
+    """
     if sum(body.copies for body in bodies) < 2:
         return
     speed, thickness = (np.array([of(body) for body in bodies]) for of in (top_speed, lambda body: width(body.shape)))
@@ -55,17 +64,23 @@ def too_fast_for_bodies(scene: Scene, bodies: list[Body]) -> Warnings:
     soft = np.array([not body.shape.rigid for body in bodies])
     meet = (limit > 0) & (speed[:, None] >= speed) & (~np.eye(len(bodies), dtype=bool) | (_copies(bodies) > 1))
     meet &= ~(soft & (thickness == 0))[:, None] | ~soft         # points meet rigid bodies alone
-    past = np.where(meet, reach / np.where(limit > 0, limit, 1), 0.0)
-    for index, other in enumerate(past.argmax(axis=1)):
-        if past[index, other] > 1:
+    stays = np.array([body.pinned.any() or bool(scene.colliders) for body in bodies])
+    boxes = np.stack([np.stack([body.positions.min(axis=(0, 1)), body.positions.max(axis=(0, 1))]) for body in bodies])
+    landing = np.where(stays, landing_speeds(scene, bodies, speed, boxes), 0.0) / substeps_a_second(scene)
+    touch = (limit > 0) & (~(soft & (thickness == 0))[:, None] | ~soft)
+    first, later = (np.where(some, far / np.where(limit > 0, limit, 1), 0.0) for some, far in ((meet, reach), (touch, landing)))
+    for index, other in enumerate(np.maximum(first, later).argmax(axis=1)):
+        falls = bool(later[index, other] > first[index, other])
+        if max(first[index, other], later[index, other]) > 1:
             name = "another copy" if other == index else f"body {bodies[other].name}"
-            yield ("bodies", index), _too_fast(scene, reach[index, other], limit[index, other], name)
+            yield ("bodies", index), _too_fast(scene, (landing if falls else reach)[index, other], limit[index, other], name, falls)
 
 
-def _too_fast(scene: Scene, reach: float, limit: float, other: str) -> str:
+def _too_fast(scene: Scene, reach: float, limit: float, other: str, falls: bool) -> str:
     needed = int(np.ceil(scene.solver.substeps * reach / limit))
-    return (f"moves up to {reach:.3g} m a substep, seen from {other}, and is held back from {limit:.3g} m at most: it may pass "
-            f"through; use {needed} substeps")
+    way = f"{reach:.3g} m a substep"
+    moves = f"falls by up to {way} on {other}" if falls else f"moves up to {way}, seen from {other}"
+    return f"{moves}, and is held back from {limit:.3g} m at most: it may pass through; use {needed} substeps"
 
 
 def too_coarse(scene: Scene, bodies: list[Body]) -> Warnings:

@@ -19,10 +19,6 @@ def _any(value: Any) -> bool:
     return True
 
 
-def _named(value: Any) -> bool:
-    return value is not None
-
-
 def _is(word: object) -> Callable[[Any], bool]:
     return lambda value: bool(value == word)
 
@@ -36,7 +32,6 @@ _LEAVE_OUT = "leave the key out"
 NOT_BUILT = (
     Missing("solver.deformable_contact", _is("exact"), "use `spheres`"),
     Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
-    Missing("effects.bending", _named, _LEAVE_OUT),
     Missing("bodies.*.contact_geometry", _is("segments"), "use `nodes`"),
 )
 

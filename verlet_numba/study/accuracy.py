@@ -15,6 +15,7 @@ import numpy as np
 
 from verlet_numba.scene.load import Loaded
 from verlet_numba.scene.problems import SceneError
+from verlet_numba.scene.schema import Scene
 from verlet_numba.study import axes
 from verlet_numba.study.convergence import TWINS, Reference, distance, extent, horizon, richardson
 from verlet_numba.study.trial import Outcome, Trial, under
@@ -54,7 +55,8 @@ class Point:
 
     def interval(self, values: Sequence[float]) -> float:
         """Half the width of the 95 % interval of the mean."""
-        return NORMAL * float(np.std(values, ddof=1)) / len(values) ** 0.5 if len(values) > 1 else float("nan")
+        known = len(values) > 1 and np.isfinite(values).all()
+        return NORMAL * float(np.std(values, ddof=1)) / len(values) ** 0.5 if known else float("nan")
 
     def statistics(self) -> dict[str, tuple[float, float]]:
         """Mean and half the interval of every measure over the repeats."""
@@ -119,10 +121,10 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
     Raises SceneError if the scene's own settings cannot run, AxisError for axes that make too many.
     """
     budget = Budget(seconds)
-    own, trial = Point({}), Trial(loaded, {}, sets)
-    scene = trial.scene
+    scene = under(loaded, {}, sets).scene
     settings = axes.grid(chosen, most) if chosen else axes.star(scene, most)
-    some_allowed(loaded, sets, settings)
+    check(loaded, sets, settings, scene)
+    own, trial = Point({}), Trial(loaded, {}, sets)
     say(f"the scene's own settings: {scene.solver.substeps} substeps x {scene.solver.iterations}")
     measure(own, trial, budget, 0, 0.0)
     if not own.sound:
@@ -145,18 +147,20 @@ def study(loaded: Loaded, sets: Sequence[str], chosen: axes.Axes, most: int, sec
     return found
 
 
-def some_allowed(loaded: Loaded, sets: Sequence[str], settings: list[dict[str, Any]]) -> None:
-    """Raises SceneError, that of the last setting, if none of them is allowed: nothing would be left to compare."""
-    refused = None
+def check(loaded: Loaded, sets: Sequence[str], settings: list[dict[str, Any]], scene: Scene) -> None:
+    """Raises AxisError for a setting that cannot be compared with the scene, SceneError, that of the last, if none is allowed."""
+    refused = []
     for each in settings:
         try:
-            under(loaded, each, sets)
+            other = under(loaded, each, sets).scene
         except SceneError as error:
-            refused = error
+            refused.append(error)
         else:
-            return
-    if refused is not None:
-        raise refused
+            if not axes.same_particles(scene, other):
+                raise axes.AxisError(f"{words(each)}: has other particles or frames than the scene, which cannot be compared one "
+                                     "by one; vary what leaves `time` and the number of particles as they are")
+    if refused and len(refused) == len(settings):
+        raise refused[-1]
 
 
 def measure(point: Point, trial: Trial, budget: Budget, seed: int, shift: float) -> None:

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from verlet_numba.study import reader
-from verlet_numba.study.measures import COLLIDERS, POSITIONS, UNITS, USUAL, VECTORS, MeasureError, measurable, measure, source
+from verlet_numba.study.measures import AXES, COLLIDERS, POSITIONS, UNITS, USUAL, VECTORS, MeasureError, measurable, measure, source
 from verlet_numba.study.reader import Array, Trajectory, TrajectoryError
 
-AXES = "xyz"
 WIDTH = 12              # of a column of figures
 __all__ = ["PICTURES", "Analysis", "MeasureError", "analyze", "plot", "table", "trajectories", "write_csv"]
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Scene
+from verlet_numba.scene.schema_bodies import Body
 from verlet_numba.scene.source import compose
 
 MOST = 40                                   # settings, by default
@@ -49,11 +50,11 @@ def grid(axes: Axes, most: int) -> list[dict[str, Any]]:
 def star(scene: Scene, most: int) -> list[dict[str, Any]]:
     """Substeps about the scene's own, under every other choice of the solver one at a time, and passes at the scene's substeps."""
     own = {path: value_of(scene, path) for path in CHOICES}
-    steps = sorted({max(1, round(factor * scene.solver.substeps)) for factor in FACTORS})
+    steps, near = (sorted({max(1, round(factor * scene.solver.substeps)) for factor in some}) for some in (FACTORS, FACTORS[1:4]))
     found: list[dict[str, Any]] = [{"solver.substeps": k} for k in steps]
     found += [{"solver.substeps": scene.solver.substeps, "solver.iterations": scene.solver.iterations * n} for n in PASSES[1:]]
     for path, values in applicable(scene):
-        found += [{"solver.substeps": k, path: value} for value in values if value != own[path] for k in steps[1:4]]
+        found += [{"solver.substeps": k, path: value} for value in values if value != own[path] for k in near]
     return found[:most]
 
 
@@ -65,6 +66,16 @@ def applicable(scene: Scene) -> Iterator[tuple[str, tuple[Any, ...]]]:
             useful = {"sequential": True, "constraint_graph": bool(kinds & RIGID), "lines": bool(kinds - RIGID)}
             values = tuple(value for value in values if useful[value])
         yield path, values
+
+
+def same_particles(scene: Scene, other: Scene) -> bool:
+    """Whether two scenes have the same particles at the same frames, so that they can be compared one by one."""
+    return scene.time == other.time and list(map(particles_of, scene.bodies)) == list(map(particles_of, other.bodies))
+
+
+def particles_of(body: Body) -> tuple[Any, ...]:
+    """What the number of a body's particles hangs on."""
+    return body.kind, body.count, body.particles, getattr(body, "file", None)
 
 
 def value_of(scene: Scene, path: str) -> Any:

@@ -26,6 +26,7 @@ UNITS = {
 """Every measure and its unit, in the order in which they are told."""
 
 VECTORS = ("momentum", "angular_momentum", "centre_of_mass")
+AXES = "xyz"
 COSTLY = ("self_intersections",)
 USUAL = tuple(name for name in UNITS if name not in COSTLY)
 SLOW = 0.01                     # m/s: below this all is at rest
@@ -144,6 +145,14 @@ def rest_time(time: Array, speed: Array) -> float:
     return float(time[moving[-1] + 1]) if moving[-1] + 1 < len(time) else np.inf
 
 
-def lengths(values: Array) -> Array:
-    """A measure as numbers: of vectors (T, 3) their length."""
+def parted(name: str) -> tuple[str, int | None]:
+    """A measure and which component of it a name means: `centre_of_mass.z` number 2, `centre_of_mass` none."""
+    whole, dot, axis = name.partition(".")
+    return whole, AXES.index(axis) if dot else None
+
+
+def numbers(values: Array, component: int | None = None) -> Array:
+    """A measure as numbers (T,) or (1,): of vectors (T, 3) a component, or their length."""
+    if component is not None:
+        return values[:, component]
     return np.linalg.norm(values, axis=1) if values.ndim == 2 else np.atleast_1d(values)

@@ -10,8 +10,8 @@ from verlet_numba.run.engine import run_chunk, start, warm
 from verlet_numba.scene.build import Model, frames
 
 SHORT = 2e-5            # s: a substep that takes less is over before anything else gets the processor
-SAMPLES = 200           # substeps that are timed, at least, if the run has as many
-LAPS = 10_000           # to see what reading the clock takes
+SAMPLES, FEW = 1000, 200    # substeps that are timed, at least, if the run has as many; few where they are short
+BATCHES, LAPS = 10, 1000    # to see what reading the clock takes
 NOTHING = 1e-3          # of the time: a phase of what the scene has not
 
 
@@ -20,13 +20,15 @@ def phase_seconds(model: Model, count: int, seconds: float) -> tuple[dict[str, f
 
     seconds: what the run takes about. Phases are timed in some substeps and scaled to all of them, by the processor's time
     of this thread, where substeps are short by the time of day, which is read ten times as fast (30 ns). So their sum
-    differs from the whole by chance. Empty on systems without these clocks (POSIX).
+    differs from the whole by chance, by the time that Python takes to grow buffers, and where a substep takes less than a
+    microsecond by much, since reading the clock takes as long. Empty on systems without these clocks (POSIX).
     """
     if not hasattr(time, "CLOCK_THREAD_CPUTIME_ID"):
         return {}, 0.0
     substeps = (count - 1) * model.world.solver.substeps + 1
-    clock = time.CLOCK_MONOTONIC if seconds < SHORT * substeps else time.CLOCK_THREAD_CPUTIME_ID
-    watch = stopwatch(clock, spacing(substeps, model.world.solver.substeps))
+    short = seconds < SHORT * substeps
+    clock = time.CLOCK_MONOTONIC if short else time.CLOCK_THREAD_CPUTIME_ID
+    watch = stopwatch(clock, spacing(substeps, model.world.solver.substeps, FEW if short else SAMPLES))
     model.world = model.world._replace(stopwatch=watch)
     warm(start(model))
     for array in (watch.sampled, watch.spent, watch.laps):
@@ -35,8 +37,10 @@ def phase_seconds(model: Model, count: int, seconds: float) -> tuple[dict[str, f
     begin = time.thread_time()
     run_chunk(start(model), chunk)
     whole = time.thread_time() - begin
+    reading = nanoseconds_a_lap(clock)
+    whole -= 1e-9 * reading * float(watch.laps.sum())
     scale = 1e-9 * substeps / max(1, int(watch.sampled[0]))
-    spent = np.maximum(0.0, watch.spent - nanoseconds_a_lap(clock) * watch.laps) * scale
+    spent = np.maximum(0.0, watch.spent - reading * watch.laps) * scale
     spent[[PHASES.index(name) for name in absent(model)]] = 0.0
     return {name: float(seconds) for name, seconds in zip(PHASES, spent, strict=True) if seconds > NOTHING * spent.sum()}, whole
 
@@ -57,17 +61,18 @@ def stopwatch(clock: int, every: int) -> Stopwatch:
 
 
 def nanoseconds_a_lap(clock: int) -> float:
-    """What reading the clock takes."""
-    watch = stopwatch(clock, 1)
-    for _ in range(2):                  # the second time it is compiled
+    """What reading the clock takes, by the batch that nothing came between."""
+    watch, found = stopwatch(clock, 1), []
+    for _ in range(BATCHES):
         watch.spent[0] = 0
         idle_laps(watch, LAPS)
-    return float(watch.spent[0]) / LAPS
+        found.append(float(watch.spent[0]) / LAPS)
+    return min(found)
 
 
-def spacing(substeps: int, a_frame: int) -> int:
+def spacing(substeps: int, a_frame: int, samples: int) -> int:
     """One substep in so many: without a common divisor with those of a frame, so that each of a frame's has its turn."""
-    every = max(1, substeps // SAMPLES)
+    every = max(1, substeps // samples)
     while np.gcd(every, a_frame) > 1:
         every += 1
     return every

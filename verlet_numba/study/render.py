@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from verlet_numba.study import moving, reader
 from verlet_numba.study.camera import NOTHING, Camera, Floats, frame_points, visible
-from verlet_numba.study.reader import Trajectory
+from verlet_numba.study.reader import Trajectory, TrajectoryError
 from verlet_numba.study.surfaces import COLLIDER, Surface, body_surfaces, ground, placed, room, solid, surface
 
 BACKGROUND = np.array([0.96, 0.97, 0.99])
@@ -61,7 +61,7 @@ def render(path: str | Path, output: str | Path, frames: Sequence[int | slice] |
         except ImportError as error:
             raise RenderError(f"{output}: needs imageio-ffmpeg: pip install 'verlet-numba[video]'") from error
         except (LookupError, TypeError, ValueError, ArithmeticError) as error:
-            raise RenderError(f"{path}: cannot be drawn, its scene or its numbers are damaged ({error!r})") from error
+            raise TrajectoryError(f"{path}: cannot be drawn, its scene or its numbers are damaged ({error!r})") from error
     return chosen
 
 

@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,12 @@ from verlet_numba.scene.load import Loaded, loads
 from verlet_numba.scene.place import place
 from verlet_numba.scene.plan import bodies_meet, frame_count
 from verlet_numba.scene.problems import SceneError
+from verlet_numba.scene.schema import Reference
 from verlet_numba.scene.support import unsupported
+from verlet_numba.study.measures import numbers, parted, rest_time
 from verlet_numba.study.phases import phase_seconds
 
 SAMPLES = 64                    # frames of a run that are kept, at most
-SPEED_AT_REST = 0.01            # m/s
 IN_FULL = {"output.precision": "float64", "output.fields": [], "output.observables": True, "expect": []}
 Settings = Mapping[str, Any]    # overrides by their dotted path
 
@@ -36,7 +37,7 @@ class Outcome:
     time: NDArray[np.float64]               # (T,) s
     position: NDArray[np.float64]           # (T, N, 3) m, in the order of the scene
     measures: dict[str, float]              # over all frames, as `summarised`
-    final: dict[str, float]                 # the contract's measures in the last frame, of vectors their length
+    final: dict[str, float]                 # what `reference` may name, in the last frame
 
 
 def under(loaded: Loaded, settings: Settings, sets: Sequence[str]) -> Loaded:
@@ -81,10 +82,10 @@ class Trial:
         if status != OK:
             return Outcome(False, seconds, np.zeros(0), np.zeros((0, model.particles, 3)), {}, {})
         chosen = np.unique(np.linspace(0, count - 1, min(SAMPLES, count)).round().astype(int))
+        time_of = np.arange(count) / self.scene.time.frame_rate
         series = observables(chunk.measures)
-        return Outcome(True, seconds, chosen / self.scene.time.frame_rate, chunk.position[chosen],
-                       summarised(series, self.scene.time.frame_rate),
-                       {name: float(np.linalg.norm(values[-1])) for name, values in series.items()})
+        series["rest_time"] = np.full(1, rest_time(time_of, series["speed_max"]))
+        return Outcome(True, seconds, time_of[chosen], chunk.position[chosen], summarised(series), at_end(series))
 
     def phases(self, seconds: float) -> tuple[dict[str, float], float]:
         """Seconds of each phase of a run, and of the whole run, which takes about so many seconds."""
@@ -99,10 +100,15 @@ def displace(model: Model, shift: float, seed: int) -> None:
         points += offset.astype(points.dtype)
 
 
-def summarised(series: Mapping[str, Array], frame_rate: float) -> dict[str, float]:
+def at_end(series: Mapping[str, Array]) -> dict[str, float]:
+    """The last number of everything that a `reference` may name."""
+    names = {name: parted(name) for name in get_args(Reference.model_fields["measure"].annotation)}
+    return {name: float(numbers(series[whole], component)[-1]) for name, (whole, component) in names.items()}
+
+
+def summarised(series: Mapping[str, Array]) -> dict[str, float]:
     """One number a measure: what does not depend on where each particle of a chaotic run ends up."""
-    energy, momentum, speed = series["total_energy"], series["momentum"], series["speed_max"]
-    restless = np.flatnonzero(speed > SPEED_AT_REST)
+    energy, momentum = series["total_energy"], series["momentum"]
     centre = series["centre_of_mass"][-1]
     return {"energy_drift": float(energy[-1] - energy[0]),
             "energy_gain": float((energy - np.minimum.accumulate(energy)).max()),
@@ -110,6 +116,6 @@ def summarised(series: Mapping[str, Array], frame_rate: float) -> dict[str, floa
             "constraint_error_max": float(series["constraint_error_max"].max()),
             "constraint_error_rms": float(np.sqrt(np.mean(series["constraint_error_rms"] ** 2))),
             "penetration_max": float(series["penetration_max"].max()),
-            "rest_time": float((restless[-1] + 1) / frame_rate if len(restless) else 0.0),
+            "rest_time": float(series["rest_time"][0]),
             "relaxations": float(series["relaxations"].sum()),
             **{f"centre_of_mass_{axis}": float(value) for axis, value in zip("xyz", centre, strict=True)}}

@@ -14,7 +14,7 @@ from verlet_numba.scene.prepare import Prepared, prepare
 from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Expect
 from verlet_numba.study import reader
-from verlet_numba.study.measures import UNITS, lengths, measurable, measure
+from verlet_numba.study.measures import UNITS, measurable, measure, numbers, parted
 from verlet_numba.study.reader import Array, Trajectory
 
 IN_FULL = ("output.fields=[velocity]", "output.observables=true", "output.precision=float64", "output.precision_bits=24")
@@ -36,7 +36,7 @@ class Verdict(NamedTuple):
     @property
     def bound(self) -> str:
         """The bound as the scene states it, with its unit."""
-        unit = f" {UNITS[self.expected.measure]}".rstrip()
+        unit = f" {UNITS[parted(self.expected.measure)[0]]}".rstrip()
         stated = next(f"{sign} {bound:.6g}" for key, sign in SIGNS.items() if (bound := getattr(self.expected, key)) is not None)
         wide = f" ± {self.expected.tolerance:.6g}" if self.expected.tolerance else ""
         return f"{stated}{wide}{unit}"
@@ -128,12 +128,14 @@ def trouble_of(summary: Summary) -> str:
 
 def judge(trajectory: Trajectory, expectations: Sequence[Expect]) -> list[Verdict]:
     """Every expectation against the frames of a trajectory; each body is read once. What cannot be measured does not hold."""
-    named = {expected.body: [other.measure for other in expectations if other.body == expected.body] for expected in expectations}
+    named = {expected.body: [parted(other.measure)[0] for other in expectations if other.body == expected.body]
+             for expected in expectations}
     found = {body: measure(trajectory, measurable(trajectory, dict.fromkeys(names), body), body) for body, names in named.items()}
     verdicts = []
     for expected in expectations:
-        if expected.measure in found[expected.body]:
-            verdicts.append(hold(expected, trajectory.time, lengths(found[expected.body][expected.measure])))
+        name, component = parted(expected.measure)
+        if name in found[expected.body]:
+            verdicts.append(hold(expected, trajectory.time, numbers(found[expected.body][name], component)))
         else:
             verdicts.append(Verdict(expected, False, None, None, "cannot be measured here"))
     return verdicts

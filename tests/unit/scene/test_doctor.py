@@ -144,6 +144,36 @@ bodies:
     assert paths(text % (72.1, 0, "true") + "effects: {contact: none}", "") == []
 
 
+def test_too_fast_when_it_has_fallen():
+    """From 4.905 m to the top of a plate of 0.1 m a point comes with 9.81 m/s: at 60 substeps a second 0.1635 m, from 0.1 m on."""
+    text = """
+solver: {substeps: 1}
+effects: {gravity: [0, 0, %s]}
+bodies: [{kind: particles, name: stone, positions: [[%s, 0, 4.955]], masses: [1], pinned: %s}]
+colliders: [{kind: %s, position: [0, 0, 0]}]
+"""
+    plate = "box, size: [1, 1, 0.1]"
+    told = "falls by up to 0.164 m a substep on collider box_0, and is held back from 0.1 m"
+    assert paths(text % (-9.81, 0, [], plate), told) == ["bodies.0"]
+    assert paths(text % (-9.81, 0, [], plate), "use 2 substeps") == ["bodies.0"]
+    for calm in ((9.81, 0, [], plate), (-9.81, 0.6, [], plate), (-9.81, 0, [0], plate), (-3, 0, [], plate),
+                 (-9.81, 0, [], "cylinder, radius: 0.1, axis: [1, 0, 0], length: 2")):
+        assert paths(text % calm, "may pass through") == []
+    assert paths(text % (-9.81, 0.9, [], "cylinder, radius: 0.05, axis: [1, 0, 0], length: 2"), told[:20]) == ["bodies.0"]
+
+
+def test_too_fast_when_it_has_fallen_on_another_body():
+    """A sheet of 1 cm that hangs is passed by one that falls on it from 4.905 m; a sheet that falls too is not caught up with."""
+    text = """
+solver: {substeps: 8}
+bodies:
+  - {kind: cloth, name: low, size: [1, 1], resolution: [101, 101], mass: 1, thickness: 0.01, pinned: %s}
+  - {kind: cloth, name: high, size: [1, 1], resolution: [101, 101], mass: 1, thickness: 0.01, position: [0, 0, 4.905]}
+"""
+    assert paths(text % "corners", "falls by up to 0.0204 m a substep on body low, and is held back from 0.01 m") == ["bodies.1"]
+    assert paths(text % "[]", "may pass through") == []
+
+
 def test_copies_too_fast_for_each_other():
     text = ("bodies: [{kind: box, size: [0.1, 0.1, 0.1], mass: 1, count: %s, "
             "scatter: {inside: [[0, 0, 0], [9, 9, 9]], speed: [%s, %s]}}]")

@@ -50,6 +50,13 @@ def test_mappings_that_are_not_there_are_made() -> None:
     assert scene("solver.substeps=3", text=TEXT + "solver:\n").solver.substeps == 3
 
 
+def test_effects_that_are_made_keep_the_gravity_that_stands_where_there_are_none() -> None:
+    assert scene("effects.friction=0.3").effects.gravity == scene().effects.gravity == (0, 0, -9.81)
+    assert scene("effects.damping=1", "effects.gravity=null").effects.gravity is None
+    assert scene("effects={damping: 1}").effects.gravity is None
+    assert scene("effects.damping=1", text=TEXT + "effects: {}").effects.gravity is None
+
+
 def test_later_ones_win() -> None:
     assert scene("seed=1", "seed=2").seed == 2
     assert scene("solver.substeps=3", "solver={iterations: 2}").solver.substeps == 8

@@ -12,7 +12,7 @@ from verlet_numba.study import accuracy_report as report
 from verlet_numba.study import axes
 from verlet_numba.study.accuracy import Point, Study, mark_front, study
 from verlet_numba.study.convergence import distance, horizon, richardson
-from verlet_numba.study.trial import Outcome
+from verlet_numba.study.trial import Outcome, under
 
 G, SPAN = 9.81, 1.0
 PENDULUM = {
@@ -90,6 +90,27 @@ def test_closed_form_is_the_truth_where_there_is_one():
     assert result.points[0].error == pytest.approx(3.0 - result.points[0].outcomes[0].final["centre_of_mass"])
 
 
+@pytest.mark.parametrize(("measure", "value"), [("centre_of_mass.z", -0.5), ("rest_time", 0.25)])
+def test_a_closed_form_may_be_a_component_or_the_time_of_rest(measure, value):
+    result = found(PENDULUM | {"reference": {"measure": measure, "value": value}}, ["solver.substeps=4"])
+    final = result.points[0].outcomes[0].final[measure]
+    assert result.points[0].error == abs(final - value)
+    assert final < 0 if measure == "centre_of_mass.z" else final == np.inf
+    report.as_dict(result)
+
+
+def test_closed_forms_of_what_only_files_tell_are_refused():
+    with pytest.raises(ValueError, match=r"reference\.measure: 'outside' is not one of"):
+        loads(json.dumps(PENDULUM | {"reference": {"measure": "outside", "value": 1}}), "scene.yaml")
+
+
+@pytest.mark.parametrize("axis", ["time.duration=1,2", "time.frame_rate=30,60", "bodies.0.count=1,2", "bodies=[],[]"])
+def test_other_particles_or_frames_cannot_be_compared(axis):
+    with pytest.raises(axes.AxisError, match="other particles or frames"):
+        found(PENDULUM | {"bodies": [{"kind": "box", "size": [1, 1, 1], "mass": 1,
+                                      "scatter": {"inside": [[0, 0, 0], [9, 9, 9]]}}]}, [axis])
+
+
 def test_report_holds_every_setting(tmp_path):
     result = found(PENDULUM, ["solver.substeps=2,4", "solver.iterations=1,2"])
     report.write(result, tmp_path)
@@ -134,6 +155,19 @@ def test_star_leaves_out_orders_that_the_bodies_have_not():
     assert {setting["solver.order"] for setting in settings if "solver.order" in setting} == {"constraint_graph"}
     assert {setting["solver.substeps"] for setting in settings} == {2, 4, 8, 16, 32}
     assert len(axes.star(scene, 7)) == 7
+
+
+def test_star_has_the_scenes_own_substeps_with_every_choice():
+    for substeps in (1, 2, 8):
+        scene = loads(json.dumps(PENDULUM | {"solver": {"substeps": substeps}}), "scene.yaml").scene
+        assert {"solver.substeps": substeps, "solver.gradient": "step_start"} in axes.star(scene, 40)
+
+
+def test_a_scene_without_effects_keeps_its_gravity_without_contact():
+    bare = loads(json.dumps({key: value for key, value in PENDULUM.items() if key != "effects"}), "scene.yaml")
+    for settings in ({"effects.contact": "none"}, {"effects.damping": 0.1}):
+        assert under(bare, settings, ()).scene.effects.gravity == (0, 0, -9.81)
+    assert under(bare, {"effects.gravity": None}, ()).scene.effects.gravity is None
 
 
 def test_settings_that_are_not_allowed_are_told():

@@ -9,7 +9,7 @@ from trajectories import FRAMES, SCENE, write
 from verlet_numba.run.postmortem import Divergence
 from verlet_numba.run.simulate import Summary
 from verlet_numba.scene.load import loads
-from verlet_numba.scene.schema import COUNTED, Expect, Measure
+from verlet_numba.scene.schema import COUNTED, Component, Expect, Measure
 from verlet_numba.study import reader
 from verlet_numba.study.measures import UNITS, USUAL, VECTORS
 from verlet_numba.study.verify import Case, hold, judge, scenes_in, trouble_of
@@ -73,6 +73,18 @@ def test_what_cannot_be_measured_does_not_hold(tmp_path):
     assert [(verdict.held, verdict.figure) for verdict in found] == [(False, None), (True, 0)]
 
 
+def test_components_of_vectors_are_seen(tmp_path):
+    """A crate that drifts along y: its distance from the origin, above which it stands, hardly tells."""
+    position = np.zeros((FRAMES, 23, 3))
+    position[:, :, 2], position[:, :, 1] = 1.0, -0.01 * np.arange(FRAMES)[:, None] / (FRAMES - 1)
+    with reader.open(write(tmp_path / "x.vtkhdf", position, position)) as trajectory:
+        found = judge(trajectory, [expect(measure=f"centre_of_mass{axis}", equal=value, tolerance=1e-3, body="crate")
+                                   for axis, value in (("", 1), (".x", 0), (".y", 0), (".z", 1))])
+    assert [verdict.held for verdict in found] == [True, True, False, True]
+    assert found[2].figure == pytest.approx(-0.01)
+    assert found[2].bound == "= 0 ± 0.001 m"
+
+
 def test_a_run_that_diverged_fails_whatever_held():
     summary = Summary("x", status="diverged", divergence=Divergence(3, 0.1, "sheet", 5, "none"))
     case = Case("x", [hold(expect(max=9), TIME, VALUES)], trouble=trouble_of(summary))
@@ -97,6 +109,7 @@ def test_a_case_tells_figure_bound_and_verdict():
 def test_measures_are_those_of_the_scene_files():
     names = list(get_args(Measure))
     assert list(UNITS) == names
+    assert {f"{name}.{axis}" for name in VECTORS for axis in "xyz"} == set(get_args(Component))
     assert set(VECTORS) | set(COUNTED) | set(USUAL) <= set(names)
 
 
