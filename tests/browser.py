@@ -51,7 +51,7 @@ class Browser:
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.base + path, data, {"Content-Type": "application/json"}, method=method)
         opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-        with opener.open(request, timeout=120) as answer:
+        with opener.open(request, timeout=300) as answer:
             return json.load(answer)["value"]
 
     def resize(self, width, height, mobile=False):
@@ -72,7 +72,7 @@ class Browser:
         """What the page says of itself: time, frame, playing."""
         return self.script("return document.body.dataset[arguments[0]] ?? null", name)
 
-    def wait(self, condition, seconds=60):
+    def wait(self, condition, seconds=240):
         end = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < end, "the page did not get there"

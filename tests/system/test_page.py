@@ -62,7 +62,7 @@ def test_it_plays_by_itself_and_asks_for_nothing(window, page):
     window.open(page)
     assert window.script("return document.getElementById('trouble').hidden")
     frames = {window.state("frame")}
-    window.wait(lambda: frames.add(window.state("frame")) or len(frames) > 2)
+    window.wait(lambda: frames.add(window.state("frame")) or len(frames) > 1)
     assert {url for url in window.requests() if not url.startswith(("data:", "about:"))} == {page}
     complaints = [entry["message"] for entry in window.log("browser") if entry["level"] in ("SEVERE", "WARNING")]
     assert [message for message in complaints if "GPU" not in message] == []
