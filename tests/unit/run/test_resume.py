@@ -224,6 +224,16 @@ def test_differences_of_scenes_are_named(there, here, words):
     assert first_difference(there, here) == words
 
 
+def test_a_signal_while_compiling_changes_nothing(stopped, monkeypatch):
+    prepared, _, path = stopped
+    before = {name: (path.parent / name).read_bytes() for name in in_folder(path.parent)}
+    monkeypatch.setattr("verlet_numba.run.simulate.warm", lambda model: os.kill(os.getpid(), signal.SIGTERM))
+    summary = run(prepared, path, resume=True)
+    assert (summary.status, summary.signal, summary.frames) == ("stopped", signal.SIGTERM, 7)
+    assert {name: (path.parent / name).read_bytes() for name in in_folder(path.parent)} == before
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
 def test_what_is_complete_is_left_as_it_is(stopped):
     prepared, whole, path = stopped
     first = run(prepared, path, resume=True)
