@@ -34,7 +34,7 @@ CLOTH = {**SHORT, "effects": {"self_collision": True, "friction": 0.3}, "collide
          "bodies": [{"kind": "cloth", "size": [1, 0.2], "resolution": [21, 5], "mass": 0.1, "thickness": 0.04,
                      "position": [0, 0, 0.55], "rotation": {"axis": [0, 1, 0], "degrees": 88}}]}
 HEAP = {"time": {"duration": 4, "frame_rate": 30}, "solver": {"substeps": 8},
-        "effects": {"friction": 0.5, "rest": {"speed": 0.05, "time": 0.2}}, "output": {"precision": "float64"},
+        "effects": {"friction": 0.5, "rest": {"speed": 0.5, "time": 0.2}}, "output": {"precision": "float64"},
         "bodies": [{"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 1, "count": 20,
                     "scatter": {"inside": [[-0.2, -0.2, 0.2], [0.2, 0.2, 2]], "speed": [0, 1]}}],
         "colliders": [{"kind": "room", "size": [0.8, 0.8, 4], "position": [0, 0, 2]}]}
@@ -111,7 +111,9 @@ def test_a_run_that_stops_again_and_again_has_the_datasets_of_an_undisturbed_one
     assert sum(frames for frames, _, _ in summary.chunks) == summary.frames
     assert_same(tmp_path / "whole.vtkhdf", path)
     if name == "heap":
-        assert datasets(path)["observables/resting/value"][-1] == 20
+        resting = datasets(path)["observables/resting/value"]
+        assert resting.max() > 10
+        assert (np.diff(resting) < 0).any()             # some wake again
     assert in_folder(tmp_path) == ["parts.vtkhdf", "whole.vtkhdf"]
 
 
