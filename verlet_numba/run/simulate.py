@@ -61,7 +61,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
             with signals.prompt():
                 run.make_ready()
         except Interrupted:
-            run.summary.status = STOPPED
+            run.summary.status, run.summary.frames = STOPPED, 0 if found is None else found.frames
         else:
             run.write(command, overwrite)
     if run.summary.status == STOPPED:

@@ -34,7 +34,7 @@ CLOTH = {**SHORT, "effects": {"self_collision": True, "friction": 0.3}, "collide
          "bodies": [{"kind": "cloth", "size": [1, 0.2], "resolution": [21, 5], "mass": 0.1, "thickness": 0.04,
                      "position": [0, 0, 0.55], "rotation": {"axis": [0, 1, 0], "degrees": 88}}]}
 HEAP = {"time": {"duration": 4, "frame_rate": 30}, "solver": {"substeps": 8},
-        "effects": {"friction": 0.5, "rest": {"speed": 0.05, "time": 0.2}}, "output": {"precision": "float64"},
+        "effects": {"friction": 0.5, "rest": {"speed": 0.5, "time": 0.2}}, "output": {"precision": "float64"},
         "bodies": [{"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 1, "count": 20,
                     "scatter": {"inside": [[-0.2, -0.2, 0.2], [0.2, 0.2, 2]], "speed": [0, 1]}}],
         "colliders": [{"kind": "room", "size": [0.8, 0.8, 4], "position": [0, 0, 2]}]}
@@ -111,7 +111,9 @@ def test_a_run_that_stops_again_and_again_has_the_datasets_of_an_undisturbed_one
     assert sum(frames for frames, _, _ in summary.chunks) == summary.frames
     assert_same(tmp_path / "whole.vtkhdf", path)
     if name == "heap":
-        assert datasets(path)["observables/resting/value"][-1] == 20
+        resting = datasets(path)["observables/resting/value"]
+        assert resting.max() > 10
+        assert (np.diff(resting) < 0).any()             # some wake again
     assert in_folder(tmp_path) == ["parts.vtkhdf", "whole.vtkhdf"]
 
 
@@ -222,6 +224,16 @@ def test_files_of_other_scenes_and_no_trajectories_are_refused(stopped, scene, t
     ({"a": [1]}, {"a": [1, 2]}, "a is [1] there, [1, 2] here"), ({"a": []}, {"a": {}}, "a is [] there, {} here")])
 def test_differences_of_scenes_are_named(there, here, words):
     assert first_difference(there, here) == words
+
+
+def test_a_signal_while_compiling_changes_nothing(stopped, monkeypatch):
+    prepared, _, path = stopped
+    before = {name: (path.parent / name).read_bytes() for name in in_folder(path.parent)}
+    monkeypatch.setattr("verlet_numba.run.simulate.warm", lambda model: os.kill(os.getpid(), signal.SIGTERM))
+    summary = run(prepared, path, resume=True)
+    assert (summary.status, summary.signal, summary.frames) == ("stopped", signal.SIGTERM, 7)
+    assert {name: (path.parent / name).read_bytes() for name in in_folder(path.parent)} == before
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_what_is_complete_is_left_as_it_is(stopped):
