@@ -228,7 +228,7 @@ def test_signals_end_a_run_with_its_file_finished(write_scene, tmp_path, number)
     assert "Traceback" not in errors
     status, count = readable(output)
     assert status == "stopped"
-    assert f"{count} frames are kept in {output}" in errors
+    assert f"{count} frames kept in {output}" in errors
     assert f"stopped, {count} frames" in told
     assert count < 6_000_000
     assert [path.name for path in tmp_path.iterdir() if path != output] == ["scene.yaml"]
