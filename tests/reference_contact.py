@@ -103,6 +103,8 @@ class Contact:
     push: float = 0.0
     rebound: float = 0.0
 
+    key = property(lambda self: (self.k, id(self.solid)))
+
     def height(self, x):
         return self.normal @ x[self.k] - self.bound
 
@@ -160,7 +162,7 @@ class Whole:
 
     def __init__(self, twin, particles):
         self.twin, self.particles = twin, particles
-        self.kept, self.overlap, self.met = {}, {}, {}      # by particle: collider, impulse, grip; m not given back; substep
+        self.kept, self.overlap, self.met = {}, {}, {}      # by particle and collider: impulse, grip; m not given back; substep
         x = twin.x[particles]
         self.size = np.linalg.norm(x - x.mean(axis=0), axis=1).max()
 
@@ -173,8 +175,8 @@ class Whole:
         inertia = sum(mass * ((r @ r) * np.eye(3) - np.outer(r, r)) for mass, r in zip(m, x - self.centre, strict=True))
         self.inverse_inertia = np.linalg.inv(inertia)
         for contact in self.contacts:
-            solid, impulse, grip = self.kept.get(contact.k, (None, 0.0, np.zeros(3)))
-            known = solid is contact.solid and self.met.get(contact.k, -2) >= twin.number - 1
+            impulse, grip = self.kept.get(contact.key, (0.0, np.zeros(3)))
+            known = self.met.get(contact.key, -2) >= twin.number - 1
             contact.impulse = contact.recalled = impulse if known else 0.0
             contact.grip, contact.kick = known * (grip - (grip @ contact.normal) * contact.normal), 0.0
 
@@ -186,8 +188,8 @@ class Whole:
 
     def aim(self, contact):
         """How far a contact shall rise. What overlapped when they met stays for a while, most errors of a gap if it pushes on."""
-        twin, n, k = self.twin, contact.normal, contact.k
-        contact.arm, contact.moved = twin.x[k] - self.centre, twin.x[k] - contact.anchor
+        twin, n, k = self.twin, contact.normal, contact.key
+        contact.arm, contact.moved = twin.x[contact.k] - self.centre, twin.x[contact.k] - contact.anchor
         gap, met = contact.height(twin.x), self.met.get(k, -2)
         error = 0.0 if contact.rebound > 0 else n @ contact.moved - gap
         standing = max(0.0, error)
@@ -263,12 +265,9 @@ class Whole:
         self.centre = self.centre + self.shift
 
     def keep(self):
-        """The impulses that the next substep begins with, of every particle the greatest."""
+        """The impulses that the next substep begins with."""
         for contact in self.contacts:
-            self.kept[contact.k] = (None, 0.0, np.zeros(3))
-        for contact in self.contacts:
-            if contact.impulse > self.kept[contact.k][1]:
-                self.kept[contact.k] = contact.solid, contact.impulse, contact.grip
+            self.kept[contact.key] = contact.impulse, contact.grip
             contact.push = contact.impulse / self.mass
 
     def rebound(self):

@@ -27,6 +27,7 @@ RELAXED, TOUCHING, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3, 4    # Snapsh
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
+NO_ROOM = -2                                            # .listed of a list that had too little room
 
 
 class Particles(NamedTuple):
@@ -244,11 +245,12 @@ class Contacts(NamedTuple):
     bound: Array                # (L,) double m; normal . position must not be below it
     anchor: Array               # (3, L) double m; the particle's place at the start, carried along by the collider
     push: Array                 # (L,) double m; displacement along the normal given so far
-    kept: Array                 # (n,) double kg m; impulse of the last substep on a rigid body's particle, along the normal
-    grip: Array                 # (3, n) double kg m; and across it
-    keeper: Array               # (n,) int 1; the collider that gave it
-    overlap: Array              # (n,) double m; of a rigid body's particle with colliders when they met, not yet given back
-    met: Array                  # (n,) int 1; substep in which it met one last
+    memory: Array               # (L,) int 1; which of the arrays below is the contact's
+    keeper: Array               # (J,) int 1; collider that a rigid body's particle remembers: particle k has k, n + k, 2 n + k ...
+    kept: Array                 # (J,) double kg m; impulse that it gave in the last substep, along the normal
+    grip: Array                 # (3, J) double kg m; and across it
+    overlap: Array              # (J,) double m; of both when they met, not yet given back
+    met: Array                  # (J,) int 1; substep in which they met last
 
 
 class Rigid(NamedTuple):
@@ -468,6 +470,22 @@ class Narrow(NamedTuple):
     seen: Array                 # (2S + 1,) int 1; of S corners: the flood that came by last, a queue; at the end: floods so far
 
 
+class Beside(NamedTuple):
+    """Scratch of the narrow phase on several threads: that of Narrow for every chunk of pairs."""
+
+    vertex: Array               # (J, 3, V) double m
+    label: Array                # (J, 2, V) int 1
+    weight: Array               # (J, 4) double 1
+    corner: Array               # (J, 3, F) int 1
+    across: Array               # (J, 3, F) int 1
+    plane: Array                # (J, 4, F) double 1
+    visible: Array              # (J, F) int 1
+    horizon: Array              # (J, 3F + 3) int 1
+    stack: Array                # (J, 3F + 3) int 1
+    seen: Array                 # (J, 2S + 1) int 1
+    found: Array                # (J,) int 1; where the chunk's meetings end
+
+
 class Manifold(NamedTuple):
     """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
 
@@ -505,6 +523,7 @@ class Meet(NamedTuple):
     spare: Pairs
     search: Search
     narrow: Narrow
+    beside: Beside | None       # None: one thread
     manifold: Manifold | None   # None: one contact a pair
     meetings: Meetings
     margin: float               # double m; how near two hulls are a contact

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import worlds
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from verlet_numba import buffers
+from verlet_numba.scene import capacity
 from verlet_numba.scene.build import frames
 from verlet_numba.scene.capacity import roomier
 from verlet_numba.study.phases import stopwatch
@@ -129,21 +132,42 @@ def test_scenes_have_every_structure():
     assert seen == set(DECLARED)
 
 
-def room_of(effects):
-    """How many touches there may be: contacts, and meetings of hulls and of particles with hulls."""
-    return sum(entry.size for entry in (effects.contact and effects.contact.particle, effects.meet and effects.meet.meetings.pair,
-                                        effects.mixed and effects.mixed.meetings.pair) if entry is not None)
+LISTS = {"contact": lambda e: (e.contact.listed, e.contact.particle), "pairs": lambda e: (e.meet.spare.listed, e.meet.pairs.first),
+         "meetings": lambda e: (e.meet.meetings.listed, e.meet.meetings.pair),
+         "spheres": lambda e: (e.spheres.candidates.listed, e.spheres.push),
+         "candidates": lambda e: (e.mixed.candidates.listed, e.mixed.pairs.first),
+         "mixed": lambda e: (e.mixed.meetings.listed, e.mixed.meetings.pair)}
 
 
-@pytest.mark.parametrize("times", [0, 1, 2])
-def test_there_is_room_for_as_many_touches_as_contacts_and_meetings(times):
+@given(st.lists(st.sampled_from(sorted(LISTS)), max_size=12))
+@settings(max_examples=20, deadline=None)
+def test_only_lists_that_lack_room_grow_and_touches_with_them(short):
     """Kernels do not check bounds: one more would be written beyond the arrays."""
     effects = worlds.built(worlds.EVERYTHING).world.effects
-    for _ in range(times):
+    before = {name: of(effects)[1].size for name, of in LISTS.items()}
+    for name in short:
+        LISTS[name](effects)[0][0] = buffers.NO_ROOM
         effects = roomier(effects)
-    room = room_of(effects)
+    assert {name: of(effects)[1].size for name, of in LISTS.items()} == {
+        name: size * 2**short.count(name) for name, size in before.items()}
+    room = sum(LISTS[name](effects)[1].size for name in ("contact", "meetings", "mixed"))
     assert effects.touches.first.size >= room
     assert effects.rigid.size.size >= effects.rigid.bodies + room + 1
+    assert effects.meet.spare.first.size == effects.meet.search.code.size == effects.meet.pairs.first.size
+    assert effects.mixed.spare.first.size == effects.mixed.candidates.first.size == effects.mixed.pairs.first.size
+    assert effects.meet.manifold.points.size >= effects.meet.meetings.pair.size
+    assert effects.restitution.rebound.size >= effects.contact.particle.size
+
+
+def test_pairs_beyond_all_bounds_are_refused(monkeypatch):
+    effects = worlds.built(worlds.EVERYTHING).world.effects
+    monkeypatch.setattr(capacity, "MOST_PAIRS", 100)
+    while effects.meet.spare.first.size <= 100 + capacity.PAIRS_A_HULL * effects.meet.still.size:
+        effects.meet.spare.listed[0] = buffers.NO_ROOM
+        effects = roomier(effects)
+    effects.meet.spare.listed[0] = buffers.NO_ROOM
+    with pytest.raises(capacity.CrowdedError, match="stand in each other"):
+        roomier(effects)
 
 
 def test_gate_casts_once_and_copies_only_what_it_must():

@@ -21,10 +21,10 @@ def aim_colliders(position, contact, rigid, touches, number, h):
     x, y, z = position[0], position[1], position[2]
     particle, normal, bound, anchor = contact.particle, contact.normal, contact.bound, contact.anchor
     first, source, mass, reach, line, answer = touches.first, touches.source, rigid.mass, rigid.reach, touches.line, touches.answer
-    overlap, met, kick, recalled = contact.overlap, contact.met, rigid.kick, touches.recalled
+    overlap, met, memory, kick, recalled = contact.overlap, contact.met, contact.memory, rigid.kick, touches.recalled
     for t in range(touches.until[COLLIDERS]):
         c, e = source[t], first[t]
-        k = particle[c]
+        k, m = particle[c], memory[c]
         nx, ny, nz = normal[0, c], normal[1, c], normal[2, c]
         rx, ry, rz = x[k] - mass[e, 1], y[k] - mass[e, 2], z[k] - mass[e, 3]
         sx = x[k] - anchor[0, c] + (kick[e, 0] + kick[e, 4] * rz - kick[e, 5] * ry)
@@ -36,9 +36,9 @@ def aim_colliders(position, contact, rigid, touches, number, h):
         line[t, 9], line[t, 10], line[t, 11] = sx, sy, sz
         gap = nx * x[k] + ny * y[k] + nz * z[k] - bound[c]
         standing = 0.0 if answer[t, 4] > 0.0 else nx * sx + ny * sy + nz * sz - gap
-        overlap[k] = min(still_given(overlap[k], met[k], number, RECOVERY * reach[e] * h), max(0.0, standing))
-        met[k] = number
-        answer[t, 0] = -gap - left_for_later(standing, overlap[k], recalled[t, 0], SMALL * reach[e])
+        overlap[m] = min(still_given(overlap[m], met[m], number, RECOVERY * reach[e] * h), max(0.0, standing))
+        met[m] = number
+        answer[t, 0] = -gap - left_for_later(standing, overlap[m], recalled[t, 0], SMALL * reach[e])
 
 
 @inlined

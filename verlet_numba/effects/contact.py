@@ -8,7 +8,7 @@ the push accumulated over the passes: a pass may take back what an earlier one g
 """
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import BOX, MESH, PLANE, SPHERE
+from verlet_numba.buffers import BOX, MESH, NO_ROOM, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
 from verlet_numba.physics.solids import box, cylinder, plane, sphere
 
@@ -75,6 +75,7 @@ def list_contacts(position, previous, inverse_mass, contact, s):
             if gap - radii[k] >= margin:
                 continue
             if c == room:
+                contact.listed[0] = NO_ROOM
                 return False
             qx, qy, qz = inward(u[k], v[k], w[k], earlier)
             gap, nx, ny, nz = entered(kind, extent, px, py, pz, qx, qy, qz, gap, nx, ny, nz)

@@ -9,7 +9,7 @@ its place at the start of the substep. At the sheet's border a particle may pass
 import math
 
 from verlet_numba._jit import formula, kernel
-from verlet_numba.buffers import MESH
+from verlet_numba.buffers import MESH, NO_ROOM
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.kernels.internal_edges import feature
 from verlet_numba.physics.closest import on_triangle
@@ -52,6 +52,7 @@ def list_of_mesh(position, previous, inverse_mass, contact, meshes, s):
         if gap >= far:
             continue
         if c == room:
+            contact.listed[0] = NO_ROOM
             return False
         level = nx * px + ny * py + nz * pz - gap + radii[k]
         nx, ny, nz = outward(nx, ny, nz, pose)

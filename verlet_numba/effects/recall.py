@@ -16,15 +16,29 @@ def recall_colliders(contact, rigid, touches, number):
     touches.given[:touches.until[-1]] = 0.0
     if contact is None:
         return
-    particle, solid, kept, grip, keeper, met = (contact.particle, contact.solid, contact.kept, contact.grip, contact.keeper,
+    particle, solid, memory, kept, grip, met = (contact.particle, contact.solid, contact.memory, contact.kept, contact.grip,
                                                 contact.met)
     source, recalled = touches.source, touches.recalled
     for t in range(touches.until[COLLIDERS]):
-        k = particle[source[t]]
-        share = 1.0 if keeper[k] == solid[source[t]] and met[k] >= number - 1 else 0.0
-        recalled[t, 0] = share * kept[k]
+        c = source[t]
+        m = memory[c] = remembered(contact, particle[c], solid[c], number)
+        share = 1.0 if met[m] >= number - 1 else 0.0
+        recalled[t, 0] = share * kept[m]
         for axis in range(3):
-            recalled[t, 1 + axis] = share * grip[axis, k]
+            recalled[t, 1 + axis] = share * grip[axis, m]
+
+
+@kernel
+def remembered(contact, k, s, number):
+    """Where particle k remembers collider s; one that it does not know takes the place of the one it met the longest ago."""
+    keeper, met, oldest = contact.keeper, contact.met, k
+    for m in range(k, keeper.size, contact.radius.size):
+        if keeper[m] == s:
+            return m
+        if met[m] < met[oldest]:
+            oldest = m
+    keeper[oldest], met[oldest] = s, number - 2         # taken, but not met in the last substep
+    return oldest
 
 
 @kernel
@@ -95,17 +109,12 @@ def keep_colliders(contact, rigid, touches):
     """What the touches with colliders pushed in this substep is where the next begins."""
     if contact is None or rigid is None:
         return
-    particle, solid, kept, keeper, given, source = (contact.particle, contact.solid, contact.kept, contact.keeper, touches.given,
-                                                    touches.source)
-    push, w, grip, line = contact.push, rigid.mass, contact.grip, touches.line
+    memory, kept, grip, given, source = contact.memory, contact.kept, contact.grip, touches.given, touches.source
+    push, w, line = contact.push, rigid.mass, touches.line
     for t in range(touches.until[COLLIDERS]):
-        k = particle[source[t]]
-        kept[k] = grip[0, k] = grip[1, k] = grip[2, k] = 0.0
-    for t in range(touches.until[COLLIDERS]):
-        c, k = source[t], particle[source[t]]
-        if given[t, 0] > kept[k]:
-            kept[k], keeper[k] = given[t, 0], solid[c]
-            grip[0, k], grip[1, k], grip[2, k] = gripping(given, line, t)
+        c, m = source[t], memory[source[t]]
+        kept[m] = given[t, 0]
+        grip[0, m], grip[1, m], grip[2, m] = gripping(given, line, t)
         push[c] = given[t, 0] * w[touches.first[t], 0]
 
 

@@ -348,14 +348,14 @@ def rouse_by_hulls(rest, hulls, meet):
 
 @kernel
 def recollect_particles(number, rest, contact):
-    """What a woken particle learnt when it touched a collider last is of the substep before this one."""
+    """What a woken particle learnt when it touched colliders last is of the substep before this one."""
     if contact is None:
         return
     body, met, resting, since, island, roused = rest.body, contact.met, rest.resting, rest.since, rest.island, rest.roused
-    for k in range(met.size):
-        b = body[k]
-        if b >= 0 and resting[b] and roused[island[b]] and met[k] == since[b]:
-            met[k] = number - 1
+    for m in range(met.size):
+        b = body[m % body.size]
+        if b >= 0 and resting[b] and roused[island[b]] and met[m] == since[b]:
+            met[m] = number - 1
 
 
 @kernel

@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
+from verlet_numba.buffers import NO_ROOM
 
 GRIDS = 48                      # the last takes all that is smaller still
 SMALLEST = 64                   # cells of a grid; from here on no two neighbours of a cell are the same cell
@@ -31,7 +32,6 @@ MIXER = 0x2545F4914F6CDD1D      # spreads the digits of a number (Vigna 2014)
 HULL = 2**32 - 1                # the lower half of a code
 FOLDS = 4                       # of a dense grid upon itself, at most
 BATCH = 32
-NO_ROOM = -1
 ZERO = np.int64(0)              # of no literal type, for which kernels would be compiled once more
 
 
@@ -84,7 +84,7 @@ def any_touches(x, y, z, radius, xs, ys, zs, radii):
 
 @kernel
 def sweep(centre, radius, body, still, first, second, search):
-    """Write the pairs of spheres that touch, first < second, ascending, and return their number; -1: no room.
+    """Write the pairs of spheres that touch, first < second, ascending, and return their number, or NO_ROOM.
 
     centre (3, H), radius (H,) [m]; body (H,) and still (H,): pairs of one body >= 0 and pairs of two that never move are
     left out, and so is what has no finite place or size. first and second (M,) are written, search.code is as long.

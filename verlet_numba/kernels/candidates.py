@@ -15,6 +15,7 @@ one, at 1.4 to 2 times the cost.
 import math
 
 from verlet_numba._jit import formula, kernel
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.kernels import broad
 from verlet_numba.kernels.copying import copy, copy_points
 
@@ -42,7 +43,8 @@ def refresh(hulls, still, pairs, spare, search, margin, horizon, all_pairs):
         listed = broad.all_pairs(centre, search.radius, hulls.body, still, spare.first, spare.second)
     else:
         listed = broad.sweep(centre, search.radius, hulls.body, still, spare.first, spare.second, search)
-    if listed == broad.NO_ROOM:
+    if listed == NO_ROOM:
+        spare.listed[0] = NO_ROOM
         return FULL
     carry(centre, pairs, spare, pairs.listed[0], listed)
     replace(pairs, spare, listed)

@@ -27,7 +27,7 @@ Lengths are relative to the hulls, coordinates to the contact: results move and 
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import POINTS
+from verlet_numba.buffers import NO_ROOM, POINTS
 from verlet_numba.kernels.polygons import apart, arrange, far_apart, overlap, side_by_side, thin, trim
 
 NEAR = 0.01         # of a hull's reach: how near corners are to the support plane, and how near to each other to be one
@@ -42,7 +42,7 @@ def widen(hulls, pairs, meetings, scratch):
     """Replace the single contact of every pair that meets in an edge or a face by several, at most POINTS.
 
     Contacts come in the order of the pairs, those of a pair side by side, in the order of their angle about the normal.
-    Returns whether there was room for all. If not, the contacts are those that the narrow phase left.
+    Returns whether there was room for all.
     """
     if not mark(hulls, pairs, meetings, scratch.points):
         return True
@@ -73,6 +73,7 @@ def widen(hulls, pairs, meetings, scratch):
         total = kept + shallow
         extra += total - 1
         if listed + extra > pair.size:
+            meetings.listed[0] = NO_ROOM
             return False
         for k in range(kept):
             move(point_corner, point_weight, ring[k], pool_corner, pool_weight, pooled + k)

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.physics.enclosing import sphere_of_four, sphere_of_spheres
 from verlet_numba.physics.flatness import unfolded
 
@@ -105,7 +106,8 @@ def list_pairs(layered, inverse_mass, margin, itself, stack, candidates):
             ratio = (2.0 * lattice[t, 3] + margin) * SLACK / lattice[t, 2]
             listed = descend(k, l, skip, particle, sphere, row, rectangle, bound, lattice[t, 0], lattice[t, 1], ratio,
                              apart, partner, inverse_mass, margin, first, second, one, two, listed)
-            if listed < 0:
+            if listed == NO_ROOM:
+                candidates.listed[0] = NO_ROOM
                 return False
     candidates.listed[0] = listed
     return True
@@ -114,7 +116,7 @@ def list_pairs(layered, inverse_mass, margin, itself, stack, candidates):
 @kernel
 def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, ratio, apart, partner, inverse_mass, margin,
             first, second, one, two, listed):
-    """List the pairs of the trees below two nodes, or below one and the same; the new number of pairs, -1: no room.
+    """List the pairs of the trees below two nodes, or below one and the same; the new number of pairs, or NO_ROOM.
 
     a and b are the lattice's spacings, `ratio` as in `unfolded`: rectangles mean nothing between two trees.
     """
@@ -143,7 +145,7 @@ def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, rat
             if never(apart, partner, p, q) or not inverse_mass[p] + inverse_mass[q] > 0.0:
                 continue
             if listed == one.size:
-                return -1
+                return NO_ROOM
             one[listed], two[listed] = min(p, q), max(p, q)
             listed += 1
             continue
@@ -205,7 +207,8 @@ def list_against(layered, points, wrapped, margin, stack, candidates):
         for u in range(roots.size - 1):
             listed = descend_wrapped(root[t], roots[u], skip, particle, sphere, skips, leaf, support, spheres, stamp, now, points,
                                      apart, partner, margin, first, second, one, two, listed)
-            if listed < 0:
+            if listed == NO_ROOM:
+                candidates.listed[0] = NO_ROOM
                 return False
     candidates.listed[0] = listed
     return True
@@ -214,7 +217,7 @@ def list_against(layered, points, wrapped, margin, stack, candidates):
 @kernel
 def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, spheres, stamp, now, points, apart, partner,
                     margin, first, second, one, two, listed):
-    """List the pairs of a layered and a wrapped tree; the new number of pairs, -1: no room."""
+    """List the pairs of a layered and a wrapped tree; the new number of pairs, or NO_ROOM."""
     first[0], second[0], height = top, other, 1
     while height > 0:
         height -= 1
@@ -228,7 +231,7 @@ def descend_wrapped(top, other, skip, particle, sphere, skips, leaf, support, sp
                 if never(apart, partner, particle[k], apart.size - 1 + leaf[l]):
                     continue
                 if listed == one.size:
-                    return -1
+                    return NO_ROOM
                 one[listed], two[listed] = particle[k], leaf[l]
                 listed += 1
             elif leaf[l] >= 0 or (particle[k] < 0 and sphere[k, 3] >= spheres[l, 3]):

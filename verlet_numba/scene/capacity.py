@@ -1,8 +1,28 @@
-"""Empty buffers with room for contacts, and the same buffers with more: contacts outgrow their room, the run goes on."""
+"""Empty buffers with room for contacts, and the same buffers with more: contacts outgrow their room, the run goes on.
+
+A kernel that finds a list too short writes NO_ROOM as its number; twice the room is made for that list alone.
+"""
 
 import numpy as np
 
-from verlet_numba.buffers import POINTS, Array, Effects, Hulls, Manifold, Meetings, Narrow, Pairs, Search, gate
+from verlet_numba.buffers import (
+    NO_ROOM,
+    POINTS,
+    Array,
+    Beside,
+    Contacts,
+    Effects,
+    Hulls,
+    Manifold,
+    Meet,
+    Meetings,
+    Mixed,
+    Narrow,
+    Pairs,
+    Search,
+    Spheres,
+    gate,
+)
 from verlet_numba.scene.colliders import room
 from verlet_numba.scene.rigid import touches_of, with_room
 from verlet_numba.scene.sphere_trees import candidates_of
@@ -10,11 +30,12 @@ from verlet_numba.scene.sphere_trees import candidates_of
 POLYTOPE = 128              # vertices of a hulls' difference that the search for a hit face may use
 GRIDS, CELLS = 48, 64       # of the search for pairs: grids, and the fewest cells of one
 POINTS_A_PAIR = 64          # of a manifold in the making
-MOST_PAIRS, PAIRS_A_HULL = 1 << 16, 16      # pairs that are listed at most, and as many more a hull
+MOST_PAIRS = 1 << 16        # that are listed at most, and as many more for each hull, for each particle of deformable bodies:
+PAIRS_A_HULL, PAIRS_A_PARTICLE = 16, 256
 
 
 class CrowdedError(Exception):
-    """So many hulls are near each other that their pairs are too many to list."""
+    """So much is near each other that their pairs are too many to list."""
 
 
 def whole(*shape: int) -> Array:
@@ -51,6 +72,12 @@ def narrow_of(hulls: Hulls) -> Narrow:
                   whole(faces), whole(3 * faces + 3), whole(3 * faces + 3), whole(2 * corners + 1))
 
 
+def beside_of(narrow: Narrow, chunks: int) -> Beside:
+    """The same for every chunk of pairs."""
+    copies = {name: gate(np.zeros((chunks, *array.shape)), array.dtype) for name, array in narrow._asdict().items()}
+    return Beside(**copies, found=whole(chunks))
+
+
 def manifold_of(corners: int, room: int) -> Manifold:
     """Scratch of manifolds of hulls of at most so many corners, with room for so many meetings."""
     return Manifold(whole(room), whole(6, room), real(6, room), real(room), whole(corners), real(4, corners), whole(2, 16),
@@ -59,43 +86,72 @@ def manifold_of(corners: int, room: int) -> Manifold:
 
 
 def roomier(effects: Effects) -> Effects:
-    """The same effects with room for twice the contacts; what pairs of hulls have learnt stays with them.
+    """The same effects with twice the room for each list that had too little; the others, and what pairs learnt, stay.
 
     Raises CrowdedError where that would take more pairs than are listed at most.
     """
-    contact, meet, spheres, mixed, rigid, restitution = (effects.contact, effects.meet, effects.spheres, effects.mixed,
-                                                         effects.rigid, effects.restitution)
-    touching = 0
-    if contact is not None:
-        touching += 2 * contact.particle.size
-        particle, solid, normal, bound, anchor, push = room(touching)
-        contact = contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push)
-        if restitution is not None:
-            restitution = restitution._replace(rebound=real(touching))
-    if meet is not None:
-        capacity, hulls = 2 * meet.meetings.pair.size, meet.still.size
-        if capacity > 2 * (MOST_PAIRS + PAIRS_A_HULL * hulls):
-            raise CrowdedError(f"more than {capacity // 2:,} pairs of {hulls:,} bodies and colliders touch: they stand in each "
-                               "other; give them more room")
-        touching += capacity
+    effects = effects._replace(contact=_roomier_contacts(effects.contact), meet=_roomier_meet(effects.meet),
+                               spheres=_roomier_spheres(effects.spheres), mixed=_roomier_mixed(effects.mixed))
+    contact, meet, mixed, rigid, restitution = effects.contact, effects.meet, effects.mixed, effects.rigid, effects.restitution
+    if contact is not None and restitution is not None and restitution.rebound.size < contact.particle.size:
+        effects = effects._replace(restitution=restitution._replace(rebound=real(contact.particle.size)))
+    touching = sum(each.size for each in (contact and contact.particle, meet and meet.meetings.pair, mixed and mixed.meetings.pair)
+                   if each is not None)
+    if rigid is not None and effects.touches is not None and effects.touches.first.size < touching:
+        rigid = with_room(rigid, touching + 1)
+        effects = effects._replace(rigid=rigid, touches=touches_of(touching, rigid.size.size))
+    return effects
+
+
+def _lacks_room(listed: Array) -> bool:
+    return bool(listed[0] == NO_ROOM)
+
+
+def _twice(room: int, things: int, each: int, what: str) -> int:
+    """Twice the room, unless it is enough for MOST_PAIRS, and `each` more a thing."""
+    if room > MOST_PAIRS + each * things:
+        raise CrowdedError(f"more than {room:,} pairs of {things:,} {what} touch: they stand in each other; give them more room")
+    return 2 * room
+
+
+def _roomier_contacts(contact: Contacts | None) -> Contacts | None:
+    if contact is None or not _lacks_room(contact.listed):
+        return contact
+    contact.listed[0] = 0
+    particle, solid, normal, bound, anchor, push, memory = room(2 * contact.particle.size)
+    return contact._replace(particle=particle, solid=solid, normal=normal, bound=bound, anchor=anchor, push=push, memory=memory)
+
+
+def _roomier_meet(meet: Meet | None) -> Meet | None:
+    if meet is None:
+        return None
+    if _lacks_room(meet.spare.listed):
+        capacity = _twice(meet.spare.first.size, meet.still.size, PAIRS_A_HULL, "bodies and colliders")
+        meet = meet._replace(pairs=copied(meet.pairs, capacity), spare=pairs_of(capacity),
+                             search=meet.search._replace(code=whole(capacity)))
+    if _lacks_room(meet.meetings.listed):
+        capacity = 2 * meet.meetings.pair.size
         manifold = None if meet.manifold is None else manifold_of(meet.manifold.near.size, capacity)
-        meet = meet._replace(pairs=copied(meet.pairs, capacity), spare=pairs_of(capacity), meetings=meetings_of(capacity),
-                             search=meet.search._replace(code=whole(capacity)), manifold=manifold)
-    if spheres is not None:
-        capacity = 2 * spheres.push.size
-        spheres = spheres._replace(candidates=candidates_of(capacity), push=real(capacity), standing=real(capacity))
-    if mixed is not None:
-        capacity = 2 * mixed.meetings.pair.size
-        touching += capacity
-        mixed = mixed._replace(candidates=candidates_of(capacity), pairs=copied(mixed.pairs, capacity),
-                               spare=pairs_of(capacity), meetings=meetings_of(capacity))
-    touches = effects.touches
-    if rigid is not None:
-        entities = rigid.bodies + touching + 1
-        rigid = with_room(rigid, entities)
-        touches = touches_of(touching, rigid.size.size)
-    return effects._replace(contact=contact, meet=meet, spheres=spheres, mixed=mixed, rigid=rigid, touches=touches,
-                            restitution=restitution)
+        meet = meet._replace(meetings=meetings_of(capacity), manifold=manifold)
+    return meet
+
+
+def _roomier_spheres(spheres: Spheres | None) -> Spheres | None:
+    if spheres is None or not _lacks_room(spheres.candidates.listed):
+        return spheres
+    capacity = _twice(spheres.push.size, spheres.soft.size, PAIRS_A_PARTICLE, "particles")
+    return spheres._replace(candidates=candidates_of(capacity), push=real(capacity), standing=real(capacity))
+
+
+def _roomier_mixed(mixed: Mixed | None) -> Mixed | None:
+    if mixed is None:
+        return None
+    if _lacks_room(mixed.candidates.listed):
+        capacity = _twice(mixed.candidates.first.size, mixed.hull.size, PAIRS_A_PARTICLE, "particles")
+        mixed = mixed._replace(candidates=candidates_of(capacity), pairs=copied(mixed.pairs, capacity), spare=pairs_of(capacity))
+    if _lacks_room(mixed.meetings.listed):
+        mixed = mixed._replace(meetings=meetings_of(2 * mixed.meetings.pair.size))
+    return mixed
 
 
 def copied(pairs: Pairs, capacity: int) -> Pairs:

@@ -30,6 +30,8 @@ ROOM_WALLS = [(axis, side) for axis in range(3) for side in (-1.0, 1.0)]
 MARGIN = 0.05           # of the shortest stick: how near a particle is listed, since relaxation may still bring it in
 BATCH = 128             # particles that are looked at together
 FIRST_ROOM = 64         # contacts; buffers grow as needed
+REMEMBERED = 3          # colliders that a particle remembers: a corner of a room has three
+NEVER = -3              # Contacts.met before any substep
 
 
 class Solid(NamedTuple):
@@ -136,10 +138,12 @@ def contacts(placed: Solids, bodies: list[Body], numbering: Numbering, size: int
         return None
     radius = spread(numbering, [body.shape.radius for body in bodies], size)
     answers = belongs if whole else np.full(size, -1)
+    remembered = REMEMBERED * size if whole else 0
     return Contacts(placed, gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
                     gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
-                    gate(np.zeros(size), np.float64), gate(np.zeros((3, size)), np.float64), gate(np.zeros(size), np.int64),
-                    gate(np.zeros(size), np.float64), gate(np.full(size, -2), np.int64))
+                    gate(np.full(remembered, -1), np.int64), gate(np.zeros(remembered), np.float64),
+                    gate(np.zeros((3, remembered)), np.float64), gate(np.zeros(remembered), np.float64),
+                    gate(np.full(remembered, NEVER), np.int64))
 
 
 def margin(bodies: list[Body]) -> float:
@@ -148,7 +152,8 @@ def margin(bodies: list[Body]) -> float:
     return MARGIN * float(min(lengths[lengths > 0], default=0.0))
 
 
-def room(capacity: int) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Empty contact buffers: particle, solid, normal, bound, anchor, push."""
+def room(capacity: int) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    """Empty contact buffers: particle, solid, normal, bound, anchor, push, memory."""
     return (gate(np.zeros(capacity), np.int64), gate(np.zeros(capacity), np.int64), gate(np.zeros((3, capacity)), np.float64),
-            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64))
+            gate(np.zeros(capacity), np.float64), gate(np.zeros((3, capacity)), np.float64), gate(np.zeros(capacity), np.float64),
+            gate(np.zeros(capacity), np.int64))
