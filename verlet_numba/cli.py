@@ -259,7 +259,7 @@ def export(trajectory: Path, output: Path, frames: str | None, overwrite: bool, 
               help="Compare these values, of several axes every combination. [default: the solver's settings one at a time]")
 @click.option("--runs", type=click.IntRange(1), default=40, show_default=True, help="Settings to compare, at most.")
 @click.option("--budget", type=click.FloatRange(0, min_open=True), default=80.0, show_default=True,
-              help="Seconds to spend on running; compiling comes on top.")
+              help="Processor seconds to spend on running; compiling comes on top.")
 @click.option("--target-error", type=click.FloatRange(0, min_open=True), help="Name the cheapest setting with no larger error.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @AS_JSON

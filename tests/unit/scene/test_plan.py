@@ -44,6 +44,7 @@ POST = "colliders: [{kind: cylinder, radius: 1, length: 2, position: [5, 5, 5]}]
     ([ROPE % ""], SELF, "self-contact", "effects.self_collision"),
     (MIXED, "effects: {rest: {}}", "rest", "effects.rest"),
     ([ROPE % ""], "solver: {order: lines}", "lines", "solver.order is lines: whole chains of sticks"),
+    ([ROPE % ""], "effects: {bending: {stiffness: 0.5}}", "bending", "named in effects"),
     (TWO, "solver: {gradient: step_start}", "directions at the start of the step", "solver.gradient is step_start"),
 ])
 def test_phases_that_are_there(bodies, rest, phase, why):
@@ -70,6 +71,9 @@ def test_phases_that_are_there(bodies, rest, phase, why):
     (TWO, "", "contact with colliders", "the scene has no collider"),
     (TWO[:1], "effects: {restitution: 1}", "restitution", "nothing touches"),
     (TWO[:1], "effects: {friction: 1}", "friction", "nothing touches"),
+    (TWO, "effects: {bending: {stiffness: 1}}", "bending", "named, but there is neither cloth nor a rope of two segments"),
+    ([ROPE % ""], "effects: {bending: {stiffness: 0}}", "bending", "named, but it is set to nothing"),
+    ([ROPE % ""], "", "bending", "not named in effects"),
     (TWO, "", "constraint graph", "solver.order is another, or there is no rigid body"),
     (TWO, "solver: {order: lines}", "lines", "solver.order is another, or there is no chain of sticks"),
     (TWO, "", "directions at the start of the step", "solver.gradient is current"),
