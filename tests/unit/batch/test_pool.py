@@ -1,9 +1,12 @@
 """Processes that may die."""
 
+import os
 import signal
+import time
 
+import numpy as np
 import pytest
-from pool_work import Parts, mark, tries
+from pool_work import Parts, mark, slowly, tries
 
 from verlet_numba.batch.pool import MOST_TRIES, Pool, Undone, _Queue, manner
 
@@ -22,6 +25,23 @@ def test_a_part_that_kills_its_worker_is_set_aside_and_takes_nothing_with_it(tmp
     assert found["die"] == Undone("its worker process died 3 times, at last by SIGKILL (out of memory?)", True)
     assert tries(tmp_path, "die") == MOST_TRIES
     assert found["error"] == found["d"] == Undone("ValueError: no such thing", False)
+
+
+@pytest.mark.parametrize(("parts", "kills"), [(40, 6), pytest.param(200, 50, marks=pytest.mark.validate)])
+def test_every_part_is_done_once_however_many_workers_are_killed(tmp_path, parts, kills):
+    """SIGKILL at random moments, whatever the worker is at: starting, idle, in the midst of a part, telling of it."""
+    keys = [f"part_{k}" for k in range(parts)]
+    random, killed, found = np.random.default_rng(parts), 0, []
+    with Pool(2) as pool:
+        for key, outcome in pool.work_through(slowly, [Parts(tuple(keys[k:k + 8]), tmp_path) for k in range(0, parts, 8)]):
+            found.append(key)
+            assert not isinstance(outcome, Undone)
+            if killed < kills and len(found) >= killed * parts // kills:
+                time.sleep(random.uniform(0, 0.03))
+                os.kill(pool._workers[random.integers(2)].process.pid, signal.SIGKILL)
+                killed += 1
+    assert sorted(found) == sorted(keys)
+    assert killed == kills
 
 
 def test_nothing_to_do_is_done(tmp_path):
