@@ -79,6 +79,18 @@ def test_who_dies_twice_waits_until_all_else_is_done(tmp_path):
     assert not todo
 
 
+def test_where_others_die_and_then_succeed_a_death_counts_for_less(tmp_path):
+    keys = tuple(f"part_{k}" for k in range(10))
+    todo = _Queue([])
+    for key in keys:
+        assert todo.returned(Parts((key,), tmp_path), [key], [key]) == []
+        todo.done(key)
+    tries = 1
+    while not todo.returned(Parts(("die",), tmp_path), ["die"], ["die"]):
+        tries += 1
+    assert tries == MOST_TRIES + 2
+
+
 @pytest.mark.parametrize(("code", "words"), [(3, "with exit code 3"), (-signal.SIGSEGV, "by SIGSEGV"), (-199, "by signal 199")])
 def test_how_a_process_ended_is_told(code, words):
     assert words in manner(code)
