@@ -8,6 +8,8 @@ BLAS do not survive a fork.
 - What it had begun is a *suspect*: it is tried again at the end of the queue, alone; after two deaths when all else is done;
   after three it is set aside. So a run that kills its workers takes nothing with it, and one that was hit by chance is not
   taken for a killer while there is other work to be hit.
+- A suspect that is then done was an accident. Where there are many, something else kills, and a death is weak evidence: 50
+  random kills among 200 runs hit one of them three times every other time. So accidents earn further tries.
 - A worker whose parent dies ends itself.
 """
 
@@ -25,6 +27,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, Protocol, Self, TypeVar
 
 MOST_TRIES = 3
+ACCIDENTS = 5                   # deaths of runs that then succeeded: for so many of them everyone has one more try
 MOST_FAILED_STARTS = 3          # in a row, by errors of their own
 LOOK_SECONDS = 0.2              # between two looks at signals
 GRACE_SECONDS = 1.2             # between asking a worker to end and ending it
@@ -123,7 +126,7 @@ class Pool:
             for worker in list(self._workers):
                 alive = worker.process.exitcode is None
                 for kind, *told in worker.messages():
-                    yield from self._told(worker, kind, told)
+                    yield from self._told(worker, kind, told, todo)
                 if not alive:
                     yield from self._bury(worker, todo)
 
@@ -134,12 +137,13 @@ class Pool:
             idle.pop().give(work, batch)
             busy += 1
 
-    def _told(self, worker: _Worker, kind: str, told: list[Any]) -> Iterator[tuple[str, Any]]:
+    def _told(self, worker: _Worker, kind: str, told: list[Any], todo: "_Queue") -> Iterator[tuple[str, Any]]:
         if kind == "begin":
             worker.begun += told
         elif kind == "done":
             key, outcome = told
             worker.left.remove(key)
+            todo.done(key)
             worker.begun = [other for other in worker.begun if other != key]
             yield key, outcome
         else:
@@ -159,7 +163,7 @@ class Pool:
         if worker.batch is not None:
             blamed = worker.begun or worker.left[:1]
             for key in todo.returned(worker.batch, worker.left, blamed):
-                yield key, Undone(f"its worker process died {MOST_TRIES} times, at last {manner(code)}", True)
+                yield key, Undone(f"its worker process died {todo.deaths[key]} times, at last {manner(code)}", True)
         self._workers.append(_Worker(self._context, self._prepare))
 
 
@@ -170,6 +174,7 @@ class _Queue:
         self.batches = deque(batches)
         self.last: deque[Any] = deque()         # to be tried when all else is done
         self.deaths: dict[str, int] = {}
+        self.accidents = 0
 
     def __bool__(self) -> bool:
         return bool(self.batches or self.last)
@@ -180,17 +185,21 @@ class _Queue:
             return self.batches.popleft()
         return self.last.popleft() if self.last and alone else None
 
+    def done(self, key: str) -> None:
+        """A part is done: whatever its workers died of was not its fault."""
+        self.accidents += self.deaths.pop(key, 0)
+
     def returned(self, batch: Any, left: Sequence[str], blamed: Sequence[str]) -> list[str]:
         """Take back what a dead worker has left undone. Returns the keys that are set aside."""
         if rest := [key for key in left if key not in blamed]:
             self.batches.appendleft(batch.only(rest))
-        aside = []
+        aside, most = [], MOST_TRIES + self.accidents // ACCIDENTS
         for key in blamed:
             self.deaths[key] = self.deaths.get(key, 0) + 1
-            if self.deaths[key] == MOST_TRIES:
+            if self.deaths[key] >= most:
                 aside.append(key)
             else:
-                (self.last if self.deaths[key] == MOST_TRIES - 1 else self.batches).append(batch.only([key]))
+                (self.last if self.deaths[key] >= MOST_TRIES - 1 else self.batches).append(batch.only([key]))
         return aside
 
 

@@ -1,9 +1,12 @@
 """Processes that may die."""
 
+import os
 import signal
+import time
 
+import numpy as np
 import pytest
-from pool_work import Parts, mark, tries
+from pool_work import Parts, mark, slowly, tries
 
 from verlet_numba.batch.pool import MOST_TRIES, Pool, Undone, _Queue, manner
 
@@ -22,6 +25,23 @@ def test_a_part_that_kills_its_worker_is_set_aside_and_takes_nothing_with_it(tmp
     assert found["die"] == Undone("its worker process died 3 times, at last by SIGKILL (out of memory?)", True)
     assert tries(tmp_path, "die") == MOST_TRIES
     assert found["error"] == found["d"] == Undone("ValueError: no such thing", False)
+
+
+@pytest.mark.parametrize(("parts", "kills"), [(40, 6), pytest.param(200, 50, marks=pytest.mark.validate)])
+def test_every_part_is_done_once_however_many_workers_are_killed(tmp_path, parts, kills):
+    """SIGKILL at random moments, whatever the worker is at: starting, idle, in the midst of a part, telling of it."""
+    keys = [f"part_{k}" for k in range(parts)]
+    random, killed, found = np.random.default_rng(parts), 0, []
+    with Pool(2) as pool:
+        for key, outcome in pool.work_through(slowly, [Parts(tuple(keys[k:k + 8]), tmp_path) for k in range(0, parts, 8)]):
+            found.append(key)
+            assert not isinstance(outcome, Undone)
+            if killed < kills and len(found) >= killed * parts // kills:
+                time.sleep(random.uniform(0, 0.03))
+                os.kill(pool._workers[random.integers(2)].process.pid, signal.SIGKILL)
+                killed += 1
+    assert sorted(found) == sorted(keys)
+    assert killed == kills
 
 
 def test_nothing_to_do_is_done(tmp_path):
@@ -57,6 +77,18 @@ def test_who_dies_twice_waits_until_all_else_is_done(tmp_path):
     assert todo.next(alone=True).keys == ("b",)
     assert todo.returned(batch, ["b"], ["b"]) == ["b"]
     assert not todo
+
+
+def test_where_others_die_and_then_succeed_a_death_counts_for_less(tmp_path):
+    keys = tuple(f"part_{k}" for k in range(10))
+    todo = _Queue([])
+    for key in keys:
+        assert todo.returned(Parts((key,), tmp_path), [key], [key]) == []
+        todo.done(key)
+    tries = 1
+    while not todo.returned(Parts(("die",), tmp_path), ["die"], ["die"]):
+        tries += 1
+    assert tries == MOST_TRIES + 2
 
 
 @pytest.mark.parametrize(("code", "words"), [(3, "with exit code 3"), (-signal.SIGSEGV, "by SIGSEGV"), (-199, "by signal 199")])
