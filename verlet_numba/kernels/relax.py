@@ -107,6 +107,14 @@ def relax_soft_runs(position, runs, softness, tolerance, approximate):
             xj[k] -= fj * dx
             yj[k] -= fj * dy
             zj[k] -= fj * dz
+    return counted(relaxed, runs.active, tolerance)
+
+
+@kernel
+def counted(relaxed, active, tolerance):
+    """How many constraints of an instance were relaxed: without a tolerance all that are active."""
+    if tolerance is None:
+        return active
     return relaxed
 
 

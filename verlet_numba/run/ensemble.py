@@ -1,0 +1,186 @@
+"""Many scenes in one process: those of equal topology side by side as the instances of one world, blocks spread over threads.
+
+What is simulated together is settled by the scenes alone, never by the threads, and an instance has the bits that it has
+alone (scene/ensemble.py): so the files are the same for any number of threads. An instance that diverges is left behind;
+the others go on. What went wrong in it is found out by simulating it again, alone.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from verlet_numba.buffers import COLUMNS, FRAME, Array, Frames
+from verlet_numba.frame import DIVERGED, OK
+from verlet_numba.run.contents import contents, now
+from verlet_numba.run.engine import State, run_chunk, start, warm
+from verlet_numba.run.postmortem import Divergence, examine
+from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, next_size, store
+from verlet_numba.run.trajectory import TrajectoryFile
+from verlet_numba.scene.build import Model, build, frames
+from verlet_numba.scene.ensemble import likeness, most_beside, together
+from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
+from verlet_numba.scene.prepare import Prepared
+
+BLOCK_BYTES = 512 << 10     # of a block's particles and constraints: they stay in the second level of the cache
+
+
+@dataclass
+class Instance:
+    """One scene of an ensemble and what becomes of it."""
+
+    prepared: Prepared
+    output: Path
+    model: Model
+    total: int                              # frames
+    summary: Summary = field(init=False)
+    file: TrajectoryFile | None = None
+    failure: Exception | None = None
+
+    def __post_init__(self) -> None:
+        self.summary = Summary(str(self.output))
+
+    @property
+    def goes_on(self) -> bool:
+        return self.failure is None and self.summary.status == COMPLETE and self.summary.frames < self.total
+
+
+def simulate_together(scenes: Sequence[Prepared], outputs: Sequence[Path], *, command: str = "", overwrite: bool = False,
+                      threads: int = 1, stop: Callable[[], bool] = bool) -> list[Summary | Exception]:
+    """Simulate scenes and write a trajectory each, equal to those of `simulate`, bit for bit.
+
+    Scenes of equal topology and solver settings are simulated side by side, all others one after another. `stop` is asked
+    every so often whether to leave off: what is not done then has the status stopped, its file the frames so far.
+
+    Returns a summary for each scene, in their order, or the error that kept its file from being made or written: one that
+    fails leaves the others alone. The seconds of a summary are its share of its block's.
+    """
+    instances = [Instance(prepared, output, build(prepared.scene, prepared.bodies, prepared.loaded.folder),
+                          frame_count(prepared.scene)) for prepared, output in zip(scenes, outputs, strict=True)]
+    work = [Block(members, stop, command, overwrite) for members in blocks(instances)]
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        for _ in pool.map(Block.simulate, work):
+            pass
+    return [instance.failure or instance.summary for instance in instances]
+
+
+def blocks(instances: Sequence[Instance]) -> list[list[Instance]]:
+    """Instances that are simulated side by side, in blocks that fit the cache; blocks as their first instances come."""
+    alike: dict[object, list[Instance]] = {}
+    for instance in instances:
+        alike.setdefault(likeness(instance.model) or id(instance), []).append(instance)
+    return [members[first:first + most] for members in alike.values()
+            for most in (most_beside(members[0].model, BLOCK_BYTES),) for first in range(0, len(members), most)]
+
+
+@dataclass
+class Block:
+    """Instances of one world, from their start to their files."""
+
+    members: list[Instance]
+    stop: Callable[[], bool]
+    command: str = ""
+    overwrite: bool = False
+
+    def simulate(self) -> None:
+        """Simulate every instance to its end, its divergence, its failure or a stop. Errors stand in the instances."""
+        clock = time.perf_counter()
+        model = self.members[0].model
+        if len(self.members) > 1:
+            model = together([member.model for member in self.members])
+        warm(start(model))
+        self.spend("compile", time.perf_counter() - clock)
+        with ExitStack() as stack:
+            for member in self.members:
+                with guarded(member):
+                    open_file(member, stack, self.command, self.overwrite)
+            self.advance(model)
+            for member in self.members:
+                if member.failure is None:
+                    with guarded(member):
+                        finish(member)
+
+    def advance(self, model: Model) -> None:
+        """Chunk after chunk, until no instance goes on."""
+        most = max(1, CHUNK_BYTES // (frame_bytes(model) * len(self.members)))
+        size, chunk, done = 1, frames(model, 1), 0
+        total = self.members[0].total
+        while any(member.goes_on for member in self.members) and not self.stop():
+            size = min(size, most, total - done)
+            if size != len(chunk.measures):
+                chunk = frames(model, size)
+            clock = time.perf_counter()
+            status = run_chunk(model, chunk, self.stop)
+            took = time.perf_counter() - clock
+            came = size if status == OK else int(model.world.clock[FRAME]) + (status == DIVERGED)
+            self.spend("simulate", took)
+            for i, member in enumerate(self.members):
+                if member.goes_on:
+                    with guarded(member):
+                        hand_over(member, part_of(chunk, i, model.particles, came))
+            done += came
+            size = next_size(size, took)
+        for member in self.members:
+            if member.goes_on:
+                member.summary.status = STOPPED
+
+    def spend(self, phase: str, seconds: float) -> None:
+        """Share out what the block took."""
+        for member in self.members:
+            member.summary.seconds[phase] = member.summary.seconds.get(phase, 0.0) + seconds / len(self.members)
+
+
+@contextmanager
+def guarded(member: Instance) -> Iterator[None]:
+    """What may fail for one instance without the others; its seconds are those of writing."""
+    clock = time.perf_counter()
+    try:
+        yield
+    except OSError as error:
+        member.failure = error
+    member.summary.seconds["write"] = member.summary.seconds.get("write", 0.0) + time.perf_counter() - clock
+
+
+def open_file(member: Instance, stack: ExitStack, command: str, overwrite: bool) -> None:
+    member.file = stack.enter_context(TrajectoryFile(
+        member.output, contents(member.prepared, member.model, command), member.total, overwrite))
+
+
+def part_of(chunk: Frames, i: int, particles: int, came: int) -> Frames:
+    """The first frames of a chunk, of instance i alone."""
+    own, measures = slice(i * particles, (i + 1) * particles), slice(i * COLUMNS, (i + 1) * COLUMNS)
+    velocity: Array | None = None if chunk.velocity is None else chunk.velocity[:came, own]
+    return Frames(chunk.position[:came, own], velocity, chunk.measures[:came, measures], chunk.sound[:came, i:i + 1])
+
+
+def hand_over(member: Instance, chunk: Frames) -> None:
+    """Give the sound frames of an instance to its file; one that is not sound is its last."""
+    lost = np.flatnonzero(chunk.sound[:, 0] == 0)
+    sound = int(lost[0]) if len(lost) else len(chunk.sound)
+    assert member.file is not None
+    store(member.model, member.file, chunk, sound, member.summary)
+    if len(lost):
+        member.summary.status = BROKEN
+
+
+def finish(member: Instance) -> None:
+    """Complete the file, and find out where a divergence was."""
+    assert member.file is not None
+    if member.summary.status == BROKEN:
+        member.summary.divergence = broken_at(member.prepared, member.summary.frames)
+    member.file.finish(member.summary.status, now(), member.summary.timing())
+
+
+def broken_at(prepared: Prepared, sound: int) -> Divergence:
+    """Simulate a scene again, alone, that has so many sound frames, and look where it diverges."""
+    model = start(build(prepared.scene, prepared.bodies, prepared.loaded.folder))
+    most, done = max(1, CHUNK_BYTES // frame_bytes(model)), 0
+    while done < sound:
+        chunk = frames(model, min(most, sound - done))
+        run_chunk(model, chunk)
+        done += len(chunk.measures)
+    return examine(model, State.of(model), 2 * model.world.solver.substeps)
