@@ -19,14 +19,15 @@ from verlet_numba.frame import DIVERGED, OK
 from verlet_numba.run.contents import contents, now
 from verlet_numba.run.engine import State, run_chunk, start, warm
 from verlet_numba.run.postmortem import Divergence, examine
-from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, next_size, store
+from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, store
 from verlet_numba.run.trajectory import TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
 from verlet_numba.scene.ensemble import likeness, most_beside, together
 from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
 from verlet_numba.scene.prepare import Prepared
 
-BLOCK_BYTES = 512 << 10     # of a block's particles and constraints: they stay in the second level of the cache
+BLOCK_BYTES = 1 << 20           # of a block's particles and constraints: they stay in the second level of the cache
+BLOCK_CHUNK_BYTES = 16 << 20    # of a block's frames on their way to the files
 
 
 @dataclass
@@ -105,25 +106,21 @@ class Block:
                         finish(member)
 
     def advance(self, model: Model) -> None:
-        """Chunk after chunk, until no instance goes on."""
-        most = max(1, CHUNK_BYTES // (frame_bytes(model) * len(self.members)))
-        size, chunk, done = 1, frames(model, 1), 0
-        total = self.members[0].total
+        """Chunk after chunk, as long as memory allows, until no instance goes on: `run_chunk` asks in between whether to stop."""
+        most = max(1, BLOCK_CHUNK_BYTES // (frame_bytes(model) * len(self.members)))
+        total, done = self.members[0].total, 0
         while any(member.goes_on for member in self.members) and not self.stop():
-            size = min(size, most, total - done)
-            if size != len(chunk.measures):
-                chunk = frames(model, size)
+            size = min(most, total - done)
+            chunk = frames(model, size)
             clock = time.perf_counter()
             status = run_chunk(model, chunk, self.stop)
-            took = time.perf_counter() - clock
+            self.spend("simulate", time.perf_counter() - clock)
             came = size if status == OK else int(model.world.clock[FRAME]) + (status == DIVERGED)
-            self.spend("simulate", took)
             for i, member in enumerate(self.members):
                 if member.goes_on:
                     with guarded(member):
                         hand_over(member, part_of(chunk, i, model.particles, came))
             done += came
-            size = next_size(size, took)
         for member in self.members:
             if member.goes_on:
                 member.summary.status = STOPPED

@@ -44,12 +44,11 @@ LINE = 64               # bytes of a line of the cache
 class Ensemble(Model):
     """The model of several scenes: scene, bodies and numbering are those of the first."""
 
-    members: list[Model]
+    beginning: tuple[Array, Array]          # (3, n) m, m/s
 
     def given(self) -> tuple[Array, Array]:
-        each, size = [member.given() for member in self.members], self.world.particles.position.shape[1]
-        position, velocity = (beside(list(arrays), self.numbering.size, size) for arrays in zip(*each, strict=True))
-        return position, velocity
+        position, velocity = self.beginning
+        return position, velocity.copy()
 
 
 def together(members: list[Model]) -> Ensemble:
@@ -59,8 +58,10 @@ def together(members: list[Model]) -> Ensemble:
     real = first.world.particles.position.dtype
     size = padded(first.numbering.size * len(members), real.itemsize)
     world = merged("", worlds, first.numbering.size, size)
+    position, velocity = (beside(list(arrays), first.numbering.size, size)
+                          for arrays in zip(*(member.given() for member in members), strict=True))
     return Ensemble(first.scene, first.bodies, first.numbering, world._replace(
-        observed=world.observed._replace(instances=len(members), sums=sums)), members)
+        observed=world.observed._replace(instances=len(members), sums=sums)), (position, velocity))
 
 
 def merged(path: str, parts: list[Any], particles: int, size: int) -> Any:

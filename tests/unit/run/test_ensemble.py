@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -15,8 +16,8 @@ from verlet_numba.scene.load import loads
 from verlet_numba.scene.place import place
 from verlet_numba.scene.prepare import Prepared
 
-ROPE = worlds.FREE["bodies"][0] | {"pinned": [0]}
-SCENE = {**worlds.FREE, "time": {"duration": 0.25}, "bodies": [ROPE], "output": {"fields": ["velocity"]}}
+ROPE = worlds.FREE["bodies"][0]
+SCENE = {**worlds.FREE, "time": {"duration": 1.5}, "bodies": [ROPE], "output": {"fields": ["velocity"]}}
 
 
 def prepared(scene):
@@ -28,8 +29,12 @@ def ropes(count):
     """Ropes that differ in length, mass and gravity; the third is torn off its place at once."""
     scenes = [{**SCENE, "effects": {"gravity": [0, k, -9.81]}, "bodies": [{**ROPE, "end": [1 + 0.1 * k, 0, 3], "mass": 1 + k}]}
               for k in range(count)]
-    scenes[2]["bodies"][0]["velocity"] = [0, 0, 1e200]
-    return [prepared(scene) for scene in scenes]
+    return [torn(prepared(scene)) if k == 2 else prepared(scene) for k, scene in enumerate(scenes)]
+
+
+def torn(scene):
+    """The same, faster than a scene file may ask for: lost in space after 1.1 s."""
+    return replace(scene, bodies=[replace(body, velocities=np.full_like(body.velocities, [0, 0, 9e29])) for body in scene.bodies])
 
 
 def others():
@@ -42,7 +47,8 @@ def digest(path):
     found = hashlib.sha256()
     with h5py.File(path) as file:
         def add(name, item):
-            if isinstance(item, h5py.Dataset) and name.split("/")[-1] not in ("start", "end", "timing", "command"):
+            told = name.split("/")[-1] in ("start", "end", "timing", "command")
+            if isinstance(item, h5py.Dataset) and not item.is_virtual and not told:
                 found.update(name.encode())
                 found.update(np.asarray(item[()]).tobytes() if item.dtype.kind != "O" else repr(item[()]).encode())
         file.visititems(add)
@@ -98,4 +104,4 @@ def test_what_is_stopped_keeps_its_frames(tmp_path):
         assert summary.status == "stopped"
         with h5py.File(path) as file:
             assert file["provenance/status"][()] == b"stopped"
-            assert 0 < len(file["particles/trajectory/position/value"]) == summary.frames < 16
+            assert 0 < len(file["particles/trajectory/position/value"]) == summary.frames < 91

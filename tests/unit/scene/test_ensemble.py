@@ -1,5 +1,7 @@
 """Scenes as instances of one world: each as it is alone, bit for bit, whatever the others are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import worlds
@@ -62,9 +64,12 @@ def set_in(part, keys, value):
     return copy
 
 
-def side_by_side(scenes, count=FRAMES):
-    """Frames of each scene as an instance: position, velocity, measures, sound."""
+def side_by_side(scenes, count=FRAMES, torn=()):
+    """Frames of each scene as an instance: position, velocity, measures, sound. torn: those whose cloth is far too fast."""
     models = [worlds.built(scene) for scene in scenes]
+    for i in torn:
+        sheet = models[i].bodies[0]
+        models[i].bodies[0] = replace(sheet, velocities=np.full_like(sheet.velocities, 1e30))
     assert len({likeness(model) for model in models} - {None}) == 1
     model, n = start(together(models)), models[0].particles
     chunk = frames(model, count)
@@ -112,14 +117,13 @@ def test_contacts_and_penetrations_are_counted_for_each():
     high = changed(SOFT, {"bodies.0.position.2": 40, "bodies.2.scatter.inside": [[-2, -2, 30], [2, 2, 31]],
                           "bodies.3.position": [0, 0, 30], "bodies.1.start.2": 31, "bodies.1.end.2": 31})
     low, far = side_by_side([SOFT, high])
-    assert low[2][:, 15].max() > 3
+    assert low[2][:, 15].max() == 3
     assert not far[2][:, [14, 15]].any()
 
 
 def test_an_instance_that_diverges_leaves_the_others_alone():
-    mad = changed(SOFT, {"bodies.0.velocity": [1e38, 0, 0]})
-    scenes = [SOFT, mad, changed(SOFT, {"bodies.0.mass": 1.0})]
-    found = side_by_side(scenes)
+    scenes = [SOFT, SOFT, changed(SOFT, {"bodies.0.mass": 1.0})]
+    found = side_by_side(scenes, torn=[1])
     assert_same_bits(found[0], alone(SOFT))
     assert_same_bits(found[2], alone(scenes[2]))
     assert found[0][3].all()
