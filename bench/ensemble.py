@@ -15,11 +15,10 @@ from report import Figure, figure
 from timing import computed, interleaved
 
 from verlet_numba.run.engine import State, start, warm
-from verlet_numba.run.ensemble import Block, Instance, blocks
+from verlet_numba.run.ensemble import Instance, advance_all, blocks, model_of
 from verlet_numba.run.simulate import Summary
 from verlet_numba.scene.build import build
-from verlet_numba.scene.ensemble import together
-from verlet_numba.scene.plan import frame_count
+from verlet_numba.scene.prepare import Prepared
 
 STUDY, RESULTS = "ensemble", Path(__file__).parent / "results"
 REPETITIONS = {True: 3, False: 11}
@@ -59,9 +58,7 @@ def measure(quick: bool) -> Iterator[Figure]:
 
 def compared(name: str, scene: Callable[[int], dict[str, Any]], count: int, case: str, quick: bool) -> Iterator[Figure]:
     scenes = [prepared(scene(k)) for k in range(count)]
-    instances = [Instance(each, Path("nowhere"), build(each.scene, each.bodies), frame_count(each.scene)) for each in scenes]
-    singles = [Instance(each, Path("nowhere"), build(each.scene, each.bodies), frame_count(each.scene)) for each in scenes]
-    planned, single = blocks(instances), [Ready([each]) for each in singles]
+    planned, single = blocks(instances(scenes)), [Ready([each]) for each in instances(scenes)]
     ready = [Ready(members) for members in planned]
     beside, alone = interleaved(REPETITIONS[quick], lambda: sum(block.seconds() for block in ready),
                                 lambda: sum(block.seconds() for block in single)) * 1e3 / count
@@ -71,12 +68,16 @@ def compared(name: str, scene: Callable[[int], dict[str, Any]], count: int, case
     yield figure(STUDY, case, "throughput", "x", alone / beside, at_least=times)
 
 
+def instances(scenes: list[Prepared]) -> list[Instance]:
+    return [Instance(k, each, Path("nowhere"), "", build(each.scene, each.bodies)) for k, each in enumerate(scenes)]
+
+
 class Ready:
     """A block at its start, again and again."""
 
     def __init__(self, members: list[Instance]) -> None:
         self.members = members
-        self.model = start(together([each.model for each in members]) if len(members) > 1 else members[0].model)
+        self.model = start(model_of(members))
         self.begin = State.of(self.model)
         warm(self.model)
 
@@ -85,7 +86,7 @@ class Ready:
         self.begin.restore(self.model)
         for member in self.members:
             member.summary, member.file = Summary(""), Nowhere()        # type: ignore[assignment]  # as a file
-        return computed(lambda: Block(self.members, bool).advance(self.model))
+        return computed(lambda: advance_all(self.model, self.members, bool))
 
 
 @click.command()

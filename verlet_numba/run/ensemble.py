@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from verlet_numba.run.postmortem import Divergence, examine
 from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, store
 from verlet_numba.run.trajectory import TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
+from verlet_numba.scene.capacity import CrowdedError
 from verlet_numba.scene.ensemble import likeness, most_beside, together
 from verlet_numba.scene.plan import CHUNK_BYTES, frame_bytes, frame_count
 from verlet_numba.scene.prepare import Prepared
@@ -34,39 +36,39 @@ BLOCK_CHUNK_BYTES = 16 << 20    # of a block's frames on their way to the files
 class Instance:
     """One scene of an ensemble and what becomes of it."""
 
+    number: int
     prepared: Prepared
     output: Path
+    command: str
     model: Model
-    total: int                              # frames
+    total: int = field(init=False)          # frames
     summary: Summary = field(init=False)
     file: TrajectoryFile | None = None
     failure: Exception | None = None
 
     def __post_init__(self) -> None:
-        self.summary = Summary(str(self.output))
+        self.total, self.summary = frame_count(self.prepared.scene), Summary(str(self.output))
 
     @property
     def goes_on(self) -> bool:
         return self.failure is None and self.summary.status == COMPLETE and self.summary.frames < self.total
 
 
-def simulate_together(scenes: Sequence[Prepared], outputs: Sequence[Path], *, command: str = "", overwrite: bool = False,
-                      threads: int = 1, stop: Callable[[], bool] = bool) -> list[Summary | Exception]:
+def simulate_together(scenes: Sequence[Prepared], outputs: Sequence[Path], commands: Sequence[str] = (), *, overwrite: bool = False,
+                      threads: int = 1, stop: Callable[[], bool] = bool) -> Iterator[tuple[int, Summary | Exception]]:
     """Simulate scenes and write a trajectory each, equal to those of `simulate`, bit for bit.
 
     Scenes of equal topology and solver settings are simulated side by side, all others one after another. `stop` is asked
     every so often whether to leave off: what is not done then has the status stopped, its file the frames so far.
 
-    Returns a summary for each scene, in their order, or the error that kept its file from being made or written: one that
-    fails leaves the others alone. The seconds of a summary are its share of its block's.
+    Yields the number of each scene, as its block ends, with its summary or with what kept its file from being made or written:
+    one that fails leaves the others alone. Of what its block took a summary has its share.
     """
-    instances = [Instance(prepared, output, build(prepared.scene, prepared.bodies, prepared.loaded.folder),
-                          frame_count(prepared.scene)) for prepared, output in zip(scenes, outputs, strict=True)]
-    work = [Block(members, stop, command, overwrite) for members in blocks(instances)]
+    instances = [Instance(number, *each, model_alone(each[0]))
+                 for number, each in enumerate(zip(scenes, outputs, commands or [""] * len(scenes), strict=True))]
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for _ in pool.map(Block.simulate, work):
-            pass
-    return [instance.failure or instance.summary for instance in instances]
+        for block in pool.map(partial(simulate_block, stop=stop, overwrite=overwrite), blocks(instances)):
+            yield from ((member.number, member.failure or member.summary) for member in block)
 
 
 def blocks(instances: Sequence[Instance]) -> list[list[Instance]]:
@@ -78,57 +80,61 @@ def blocks(instances: Sequence[Instance]) -> list[list[Instance]]:
             for most in (most_beside(members[0].model, BLOCK_BYTES),) for first in range(0, len(members), most)]
 
 
-@dataclass
-class Block:
-    """Instances of one world, from their start to their files."""
-
-    members: list[Instance]
-    stop: Callable[[], bool]
-    command: str = ""
-    overwrite: bool = False
-
-    def simulate(self) -> None:
-        """Simulate every instance to its end, its divergence, its failure or a stop. Errors stand in the instances."""
-        clock = time.perf_counter()
-        model = self.members[0].model
-        if len(self.members) > 1:
-            model = together([member.model for member in self.members])
-        warm(start(model))
-        self.spend("compile", time.perf_counter() - clock)
-        with ExitStack() as stack:
-            for member in self.members:
+def simulate_block(members: list[Instance], stop: Callable[[], bool], overwrite: bool) -> list[Instance]:
+    """Simulate the instances of one world to their ends, divergences, failures or a stop, and write their files."""
+    clock = time.perf_counter()
+    model = model_of(members)
+    warm(start(model))
+    spend(members, "compile", time.perf_counter() - clock)
+    with ExitStack() as stack:
+        for member in members:
+            with guarded(member):
+                member.file = stack.enter_context(TrajectoryFile(
+                    member.output, contents(member.prepared, member.model, member.command), member.total, overwrite))
+        try:
+            advance_all(model, members, stop)
+        except CrowdedError as error:
+            for member in members:
+                member.failure = member.failure or error
+        for member in members:
+            if member.failure is None:
                 with guarded(member):
-                    open_file(member, stack, self.command, self.overwrite)
-            self.advance(model)
-            for member in self.members:
-                if member.failure is None:
-                    with guarded(member):
-                        finish(member)
+                    finish(member)
+    return members
 
-    def advance(self, model: Model) -> None:
-        """Chunk after chunk, as long as memory allows, until no instance goes on: `run_chunk` asks in between whether to stop."""
-        most = max(1, BLOCK_CHUNK_BYTES // (frame_bytes(model) * len(self.members)))
-        total, done = self.members[0].total, 0
-        while any(member.goes_on for member in self.members) and not self.stop():
-            size = min(most, total - done)
-            chunk = frames(model, size)
-            clock = time.perf_counter()
-            status = run_chunk(model, chunk, self.stop)
-            self.spend("simulate", time.perf_counter() - clock)
-            came = size if status == OK else int(model.world.clock[FRAME]) + (status == DIVERGED)
-            for i, member in enumerate(self.members):
-                if member.goes_on:
-                    with guarded(member):
-                        hand_over(member, part_of(chunk, i, model.particles, came))
-            done += came
-        for member in self.members:
+
+def model_alone(prepared: Prepared) -> Model:
+    return build(prepared.scene, prepared.bodies, prepared.loaded.folder)
+
+
+def model_of(members: list[Instance]) -> Model:
+    return together([member.model for member in members]) if len(members) > 1 else members[0].model
+
+
+def advance_all(model: Model, members: list[Instance], stop: Callable[[], bool]) -> None:
+    """Chunk after chunk, as long as memory allows, until no instance goes on: `run_chunk` asks in between whether to stop."""
+    most = max(1, BLOCK_CHUNK_BYTES // (frame_bytes(model) * len(members)))
+    total, done = members[0].total, 0
+    while any(member.goes_on for member in members) and not stop():
+        chunk = frames(model, min(most, total - done))
+        clock = time.perf_counter()
+        status = run_chunk(model, chunk, stop)
+        spend(members, "simulate", time.perf_counter() - clock)
+        came = len(chunk.measures) if status == OK else int(model.world.clock[FRAME]) + (status == DIVERGED)
+        for i, member in enumerate(members):
             if member.goes_on:
-                member.summary.status = STOPPED
+                with guarded(member):
+                    hand_over(member, part_of(chunk, i, model.particles, came))
+        done += came
+    for member in members:
+        if member.goes_on:
+            member.summary.status = STOPPED
 
-    def spend(self, phase: str, seconds: float) -> None:
-        """Share out what the block took."""
-        for member in self.members:
-            member.summary.seconds[phase] = member.summary.seconds.get(phase, 0.0) + seconds / len(self.members)
+
+def spend(members: list[Instance], phase: str, seconds: float) -> None:
+    """Share out what a block took."""
+    for member in members:
+        member.summary.seconds[phase] = member.summary.seconds.get(phase, 0.0) + seconds / len(members)
 
 
 @contextmanager
@@ -139,12 +145,7 @@ def guarded(member: Instance) -> Iterator[None]:
         yield
     except OSError as error:
         member.failure = error
-    member.summary.seconds["write"] = member.summary.seconds.get("write", 0.0) + time.perf_counter() - clock
-
-
-def open_file(member: Instance, stack: ExitStack, command: str, overwrite: bool) -> None:
-    member.file = stack.enter_context(TrajectoryFile(
-        member.output, contents(member.prepared, member.model, command), member.total, overwrite))
+    spend([member], "write", time.perf_counter() - clock)
 
 
 def part_of(chunk: Frames, i: int, particles: int, came: int) -> Frames:
@@ -174,7 +175,7 @@ def finish(member: Instance) -> None:
 
 def broken_at(prepared: Prepared, sound: int) -> Divergence:
     """Simulate a scene again, alone, that has so many sound frames, and look where it diverges."""
-    model = start(build(prepared.scene, prepared.bodies, prepared.loaded.folder))
+    model = start(model_alone(prepared))
     most, done = max(1, CHUNK_BYTES // frame_bytes(model)), 0
     while done < sound:
         chunk = frames(model, min(most, sound - done))

@@ -42,6 +42,12 @@ def others():
     return [prepared({**SCENE, "solver": {"substeps": 3}}), prepared({**SCENE, "time": {"duration": 0.2}})]
 
 
+def in_order(found):
+    """What became of each scene."""
+    found = dict(found)
+    return [found[number] for number in sorted(found)]
+
+
 def digest(path):
     """Of every dataset but those that tell of time."""
     found = hashlib.sha256()
@@ -69,7 +75,7 @@ def test_files_are_those_of_single_runs_for_any_number_of_threads(alone, tmp_pat
     monkeypatch.setattr("verlet_numba.run.ensemble.BLOCK_BYTES", 4 * 1500)      # several blocks
     digests, summaries = alone
     scenes, paths = ropes(9) + others(), [tmp_path / f"{k}.vtkhdf" for k in range(11)]
-    found = simulate_together(scenes, paths, threads=threads)
+    found = in_order(simulate_together(scenes, paths, threads=threads))
     assert [digest(path) for path in paths] == digests
     for mine, single in zip(found, summaries, strict=True):
         for key in ("frames", "substeps", "status", "relaxations", "contacts", "constraint_error_max", "divergence"):
@@ -79,8 +85,9 @@ def test_files_are_those_of_single_runs_for_any_number_of_threads(alone, tmp_pat
 
 
 def test_blocks_are_settled_by_the_scenes(monkeypatch, tmp_path):
-    instances = [Instance(each, tmp_path, build(each.scene, each.bodies), 1) for each in ropes(5) + others() + ropes(3)]
-    assert [[instances.index(each) for each in block] for block in blocks(instances)] == [[0, 1, 2, 3, 4, 7, 8, 9], [5], [6]]
+    instances = [Instance(k, each, tmp_path, "", build(each.scene, each.bodies))
+                 for k, each in enumerate(ropes(5) + others() + ropes(3))]
+    assert [[each.number for each in block] for block in blocks(instances)] == [[0, 1, 2, 3, 4, 7, 8, 9], [5], [6]]
     monkeypatch.setattr("verlet_numba.run.ensemble.BLOCK_BYTES", 1)
     assert all(len(block) == 1 for block in blocks(instances))
 
@@ -88,7 +95,7 @@ def test_blocks_are_settled_by_the_scenes(monkeypatch, tmp_path):
 def test_a_file_that_cannot_be_made_or_written_fails_alone(tmp_path):
     paths = [tmp_path / "a.vtkhdf", tmp_path / "there.vtkhdf", tmp_path / "no" / "folder.vtkhdf", tmp_path / "d.vtkhdf"]
     paths[1].write_text("mine")
-    found = simulate_together([ropes(3)[0]] * 4, paths)
+    found = in_order(simulate_together([ropes(3)[0]] * 4, paths))
     assert isinstance(found[1], FileExistsError)
     assert isinstance(found[2], OSError)
     assert found[0].status == found[3].status == "complete"
@@ -99,7 +106,7 @@ def test_a_file_that_cannot_be_made_or_written_fails_alone(tmp_path):
 def test_what_is_stopped_keeps_its_frames(tmp_path):
     asked = []
     paths = [tmp_path / f"{k}.vtkhdf" for k in range(3)]
-    found = simulate_together(ropes(4)[:2] + ropes(4)[3:], paths, stop=lambda: len(asked) > 1 or asked.append(0))
+    found = in_order(simulate_together(ropes(4)[:2] + ropes(4)[3:], paths, stop=lambda: len(asked) > 1 or asked.append(0)))
     for summary, path in zip(found, paths, strict=True):
         assert summary.status == "stopped"
         with h5py.File(path) as file:
