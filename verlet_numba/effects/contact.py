@@ -7,8 +7,6 @@ particles leave by the face through which they came. Before every relaxation pas
 the push accumulated over the passes: a pass may take back what an earlier one gave too much, never pull.
 """
 
-import numpy as np
-
 from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.buffers import BOX, COLUMNS, MESH, NO_ROOM, PENETRATION, PLANE, SPHERE
 from verlet_numba.physics.pose import inward, outward
@@ -176,8 +174,8 @@ def penetration(measures, position, inverse_mass, contact, instances):
 
 @inlined
 def instance(k, instances):
-    """The instance that particle k is of. Numbers of 32 bits are divided three times as fast as others."""
-    return np.int64(np.uint32(k) % np.uint32(instances))
+    """The instance that particle k is of. A division takes as long as a tenth of a contact: one alone does without."""
+    return 0 if instances == 1 else k % instances
 
 
 @kernel
