@@ -130,18 +130,18 @@ def moving(sticks: Sticks) -> Array:
 
 def likeness(model: Model) -> bytes | None:
     """Equal for scenes that may be instances of one world; None: the scene is simulated in a world of its own."""
-    world, scene = model.world, model.scene
-    mixed = None not in (world.runs, world.sticks) and (world.runs_softness is None) != (world.sticks_softness is None)
-    parts = {name for name, part in in_runs(world)._asdict().items() if part is not None}
+    alone, world, scene = model.world, in_runs(model.world), model.scene
+    mixed = None not in (alone.runs, alone.sticks) and (alone.runs_softness is None) != (alone.sticks_softness is None)
+    parts = {name for name, part in world._asdict().items() if part is not None}
     effects = {name for name, effect in world.effects._asdict().items() if effect is not None}
     bodies_answer = world.effects.contact is not None and (world.effects.contact.body >= 0).any()
     if mixed or bodies_answer or world.solver.tolerance or not parts <= BESIDE_PARTS or not effects <= BESIDE_EFFECTS:
         return None
     digest = hashlib.sha256(repr((scene.time, scene.output, world.solver)).encode())
-    digest.update(np.packbits(world.particles.inverse_mass > 0).tobytes())
-    if world.sticks is not None:
-        digest.update(np.packbits(moving(world.sticks)).tobytes())
-    for path, value in leaves("", in_runs(world)):
+    digest.update((world.particles.inverse_mass > 0).tobytes())
+    if alone.sticks is not None:
+        digest.update(moving(alone.sticks).tobytes())
+    for path, value in leaves("", world):
         digest.update(f"{path} {getattr(value, 'dtype', '')} {np.shape(value)}".encode())
         if path not in PARTICLES | VALUES and path.split(".")[0] != "solver":
             digest.update(value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode())
