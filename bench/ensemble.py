@@ -1,4 +1,4 @@
-"""Scenes side by side against scenes one after another, in one thread: `python bench/ensemble.py [--quick]`.
+"""Scenes side by side against scenes one after another, in one thread: `python bench/ensemble.py [--quick] [--only ropes]`.
 
 Both are simulated by the same blocks (run/ensemble.py), of many instances and of one, in turn and in the same process.
 Building the worlds, machine code and writing stand apart. Writes ensemble.csv; exit code 1 if a bar is missed.
@@ -49,14 +49,14 @@ def rooms(k: int) -> dict[str, Any]:
     return scene_of(dice, duration=5, colliders=({"kind": "room", "size": [4, 4, 4], "position": [0, 0, 2]},)) | {"seed": k}
 
 
-def measure(quick: bool) -> Iterator[Figure]:
-    yield from compared("ropes", ropes, 64, "64 ropes of 50 sticks, 5 s", quick)
-    yield from compared("cloths", cloths, 32, "32 cloths 20x20, 2 s", quick)
-    if not quick:
-        yield from compared("rooms", rooms, 8, "8 rooms of 50 icosahedra, 5 s", quick)
+CASES: dict[str, tuple[Callable[[int], dict[str, Any]], int, str]] = {
+    "ropes": (ropes, 64, "64 ropes of 50 sticks, 5 s"),
+    "cloths": (cloths, 32, "32 cloths 20x20, 2 s"),
+    "rooms": (rooms, 8, "8 rooms of 50 icosahedra, 5 s")}
 
 
-def compared(name: str, scene: Callable[[int], dict[str, Any]], count: int, case: str, quick: bool) -> Iterator[Figure]:
+def compared(name: str, quick: bool) -> Iterator[Figure]:
+    scene, count, case = CASES[name]
     scenes = [prepared(scene(k)) for k in range(count)]
     planned, single = blocks(instances(scenes)), [Ready([each]) for each in instances(scenes)]
     ready = [Ready(members) for members in planned]
@@ -90,13 +90,14 @@ class Ready:
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="Fewer repetitions, and no rooms.")
+@click.option("--quick", is_flag=True, help="Fewer repetitions.")
+@click.option("--only", type=click.Choice(list(CASES)), multiple=True, help="These scenes alone; rooms take minutes to compile.")
 @click.option("--results", type=click.Path(path_type=Path), default=RESULTS, help="Folder of the table.")
-def main(quick: bool, results: Path) -> None:
+def main(quick: bool, only: tuple[str, ...], results: Path) -> None:
     """Measure ensembles against single runs."""
     where, figures = report.machine() + (", quick" if quick else ""), []
     click.echo(f"{where}\n{report.HEADER}")
-    for found in measure(quick):
+    for found in (found for name in only or CASES for found in compared(name, quick)):
         click.echo(report.line(found))
         figures.append(found)
     results.mkdir(parents=True, exist_ok=True)

@@ -100,12 +100,14 @@ def test_an_instance_has_the_bits_of_its_scene_alone(changes):
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("count", [2, 8, 17, BESIDE])
-def test_so_many_ropes_that_fall(count, precision):
-    """Lengths of whole vectors and others; gravity alone, one pass."""
-    rope = worlds.FREE["bodies"][0]
+def test_so_many_ropes_and_arms_that_fall(count, precision):
+    """Numbers of whole vectors and others; gravity alone. Single sticks alone are runs beside others."""
+    rope, arm = worlds.FREE["bodies"]
     scenes = [{**worlds.FREE, "solver": {"substeps": 4, "precision": precision}, "effects": {"gravity": [0, 0.1 * k, -9.81]},
-               "output": {"fields": ["velocity"]}, "bodies": [{**rope, "end": [1 + 0.01 * k, 0, 3], "pinned": [0]}]}
-              for k in range(count)]
+               "output": {"fields": ["velocity"]}, "bodies": [
+                   {**rope, "end": [1 + 0.01 * k, 0, 3], "pinned": [0], "thickness": 0},
+                   {**arm, "angles": [], "masses": [1, 2, 0.5 + 0.1 * k, 1], "sticks": [[0, 1], [1, 2], [2, 3], [3, 0, 0.5]],
+                    "pinned": [0, 3]}]} for k in range(count)]
     found = side_by_side(scenes)
     for k in {0, 1, count // 2, count - 1}:
         assert_same_bits(found[k], alone(scenes[k]))
