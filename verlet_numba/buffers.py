@@ -23,10 +23,12 @@ WHOLE, INTEGRATED = 0, 1                                # its stage: where a sub
 KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
 ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
 COLUMNS = 20
-RELAXED, TOUCHING, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3, 4    # Snapshot.counts
+RELAXED, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3                 # Snapshot.counts
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
+BESIDE = 64                                             # instances of a scene in one world, at most
+SUMS = 12 * BESIDE                                      # numbers of Observed.sums where there are several
 NO_ROOM = -2                                            # .listed of a list that had too little room
 
 
@@ -147,7 +149,7 @@ class Start(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    acceleration: Array         # (3, n) real m/s^2; 0 for what is pinned
+    acceleration: Array | None  # (3, n) real m/s^2; 0 for what is pinned; None: Particles has it, nothing else accelerates
 
 
 class Wind(NamedTuple):
@@ -237,7 +239,7 @@ class Contacts(NamedTuple):
     body: Array                 # (n,) int 1; rigid body that answers as a whole, -1: the particle answers alone
     planes_only: Array          # (n,) int 1; 1: the particle's body meets all other colliders as a hull
     near: Array                 # (B,) int 1; scratch: which of a batch of particles are near
-    margin: float               # double m; how near a particle must come to be listed
+    within: Array               # (n,) double m; how near a particle must come to be listed: its radius and a margin
     listed: Array               # (1,) int 1; how many contacts there are
     particle: Array             # (L,) int 1
     solid: Array                # (L,) int 1
@@ -568,14 +570,14 @@ class Features(NamedTuple):
 
 class Friction(NamedTuple):
     particle: Array             # (2, n) real 1; static and dynamic
-    solid: Array                # (2, K) double 1
+    solid: Array                # (2, Y) double 1; Y = I K: of every instance
     hull: Array                 # (2, H) double 1
     point: Array                # (2, J) double 1; hulls of bodies and of particles
 
 
 class Restitution(NamedTuple):
     particle: Array             # (n,) real 1
-    solid: Array                # (K,) double 1
+    solid: Array                # (Y,) double 1; Y = I K: of every instance
     hull: Array                 # (H,) double 1
     point: Array                # (J,) double 1; hulls of bodies and of particles
     rebound: Array              # (L,) double m; displacement along the normal after the impact, 0 where there is none
@@ -657,13 +659,19 @@ class Solver(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """What the observables of a frame need to know."""
+    """What the observables of a frame need to know.
 
-    scene_order: Array          # (N,) int 1; inner index of each particle of the file
-    mass: Array                 # (N,) double kg
-    gravity: Array | None       # (3, N) double m/s^2; for the potential energy, pinned particles included
-    pairs: Array                # (2, D) int 1; inner indices of the file's distance constraints
-    rest: Array                 # (D,) double m
+    A world may hold I instances of a scene (scene/ensemble.py), one unless it is told: particle k of the scene alone is
+    particles I k to I k + I - 1. What differs between instances stands in the same way: I values after one another.
+    """
+
+    instances: int              # int 1; I
+    scene_order: Array          # (N,) int 1; inner index of each particle of the file, of the first instance
+    mass: Array                 # (Q,) double kg; Q = I N
+    gravity: Array | None       # (3, I) double m/s^2; for the potential energy, pinned particles included
+    pairs: Array                # (2, D) int 1; inner indices of the file's distance constraints, of the first instance
+    rest: Array                 # (U,) double m; U = I D
+    sums: Array | None          # (X,) double SI; scratch of kernels/observe_beside.py; None: there is one instance
 
 
 class Snapshot(NamedTuple):
@@ -671,8 +679,8 @@ class Snapshot(NamedTuple):
 
     position: Array             # (3, n) real m
     before: Array               # (3, n) real m; one substep earlier
-    counts: Array               # (5,) int 1; relaxations since the last frame, contacts and relaxations of the kept frame,
-                                # fallbacks since the last frame and of the kept one
+    counts: Array               # (4,) int 1; of each instance: relaxations since the last frame and of the kept one, fallbacks
+    touching: Array             # (I,) int 1; contacts of the kept frame
 
 
 class Stopwatch(NamedTuple):
@@ -711,11 +719,12 @@ class World(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """A chunk of frames, particles in the order of the file."""
+    """A chunk of frames, particles in the order of the file, one instance after the other."""
 
-    position: Array             # (F, N, 3) file m
-    velocity: Array | None      # (F, N, 3) file m/s
-    measures: Array             # (F, M) double SI; columns as numbered above
+    position: Array             # (F, Q, 3) file m
+    velocity: Array | None      # (F, Q, 3) file m/s
+    measures: Array             # (F, W) double SI; columns as numbered above
+    sound: Array                # (F, I) int 1; 1: all of the instance is finite and in space
 
 
 def gate(values: Any, dtype: Any) -> Array:

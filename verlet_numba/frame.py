@@ -62,7 +62,7 @@ OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 def advance(world, frames, budget):
     """A chunk of frames. A frame is kept at its time and finished one substep later, so that its velocity is central.
 
-    Returns OK, DIVERGED (the frame of the clock is not a number), PAUSED (after `budget` substeps) or FULL (the contacts
+    Returns OK, DIVERGED (no instance is sound in the frame of the clock), PAUSED (after `budget` substeps) or FULL (the contacts
     outgrew their buffers). After PAUSED, or FULL with larger buffers, the next call goes on bit for bit.
     """
     particles, runs, runs_softness, sticks, sticks_softness, start, angles, lines, lines_softness, graph, collided = world[:11]
@@ -81,8 +81,8 @@ def advance(world, frames, budget):
                 end = (clock[NUMBER] + 1) * h
                 begin(stopwatch, clock[NUMBER])
                 if clock[SUBSTEP] == substeps - 1:
-                    contacts = touching(contact) + pushing(touches, features, meet, mixed) + touching_spheres(spheres)
-                    keep(position, previous, snapshot, contacts)
+                    keep(position, previous, snapshot, pushing(touches, features, meet, mixed) + touching_spheres(spheres))
+                    touching(contact, snapshot.touching)
                     lap(stopwatch, FRAMES)
                 settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
                 if idle(rest, moving):                                      # all bodies rest: no work
@@ -187,14 +187,15 @@ def advance(world, frames, budget):
             clock[SUBSTEP] += 1
             clock[STAGE] = WHOLE
         f = clock[FRAME]
-        sound = observe(frames.measures[f], position, snapshot, observed, h)
+        sound = observe(frames.measures[f], frames.sound[f], position, snapshot, observed, h)
+        penetration(frames.measures[f], snapshot.position, inverse_mass, contact, observed.instances)
         frames.measures[f, PENETRATION] = max(
-            penetration(snapshot.position, inverse_mass, contact),
+            frames.measures[f, PENETRATION],
             deepest_in_meshes(snapshot.position, inverse_mass, contact, meshes), depth_of_hulls(snapshot.position, meet, hulls),
             deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest))
         frames.measures[f, RESTING] = at_rest(rest)
-        record(frames.position[f], snapshot.position, observed.scene_order)
-        record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)
+        record(frames.position[f], snapshot.position, observed.scene_order, observed.instances)
+        record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, observed.instances, h)
         lap(stopwatch, FRAMES)
         if not sound:
             return DIVERGED

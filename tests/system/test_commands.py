@@ -10,7 +10,8 @@ from PIL import Image
 
 from verlet_numba._version import __version__
 
-COMMANDS = ("run", "check", "plan", "schema", "warm", "render", "view", "export", "analyze", "compare", "verify", "sweep", "accuracy")
+COMMANDS = ("run", "check", "plan", "schema", "warm", "render", "view", "export", "accuracy", "analyze", "compare",
+            "verify", "sweep")
 HEAVY = {"numba", "llvmlite", "scipy", "trimesh", "matplotlib", "h5py"}
 # A process small enough that the memory it hands down to its child does not count.
 PEAK_MEMORY = """\

@@ -7,6 +7,7 @@ substep, to rounding: it cannot creep. (Rigid bodies creep by what the sweeps of
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
+from verlet_numba.effects.contact import instance
 from verlet_numba.physics.friction import held
 
 
@@ -17,11 +18,12 @@ def rub(position, contact, friction):
         return
     particle, solid, body, push = contact.particle, contact.solid, contact.body, contact.push
     normal, anchor, own, other = contact.normal, contact.anchor, friction.particle, friction.solid
+    instances = other.shape[1] // contact.solids.kind.size
     x, y, z = position[0], position[1], position[2]
     for c in range(contact.listed[0]):
         k = particle[c]
         if push[c] > 0.0 and body[k] < 0:
-            static, dynamic = coefficients(own, other, k, solid[c])
+            static, dynamic = coefficients(own, other, k, solid[c] * instances + instance(k, instances))
             sx, sy, sz, slide = slide_of(normal, anchor, c, x[k], y[k], z[k])
             if slide > 0.0:
                 share = held(slide, push[c], static, dynamic)

@@ -11,7 +11,15 @@ def fall(acceleration, gravity):
     if gravity is None:
         acceleration[:] = 0
         return
+    begin_with(acceleration, gravity.acceleration)
+
+
+@kernel
+def begin_with(acceleration, constant):
+    """The sum begins anew, unless nothing else is ever added to it."""
+    if constant is None:
+        return
     for axis in range(3):
-        total, g = acceleration[axis], gravity.acceleration[axis]
+        total, g = acceleration[axis], constant[axis]
         for k in range(total.size):
             total[k] = g[k]

@@ -32,7 +32,7 @@ def find_mesh_contacts(position, previous, inverse_mass, contact, meshes):
 @kernel
 def list_of_mesh(position, previous, inverse_mass, contact, meshes, s):
     """List the contacts of mesh s: of particles that may have met the sphere that holds it in this substep. False: no room."""
-    solids, radii, margin, room = contact.solids, contact.radius, contact.margin, contact.particle.size
+    solids, radii, within, room = contact.solids, contact.radius, contact.within, contact.particle.size
     pose, earlier = pose_of(solids.origin, solids.rotation, s), pose_of(solids.origin_before, solids.rotation_before, s)
     particle, solid, push, as_hull, reach = contact.particle, contact.solid, contact.push, contact.planes_only, solids.reach[s]
     normal, bound, anchor, side = contact.normal, contact.bound, contact.anchor, meshes.side[s]
@@ -43,7 +43,7 @@ def list_of_mesh(position, previous, inverse_mass, contact, meshes, s):
             continue
         px, py, pz = inward(x[k], y[k], z[k], pose)
         qx, qy, qz = inward(u[k], v[k], w[k], earlier)
-        step, far = length(px - qx, py - qy, pz - qz), radii[k] + margin
+        step, far = length(px - qx, py - qy, pz - qz), within[k]
         if length(px, py, pz) >= reach + far + step:
             side[k] = 0
             continue

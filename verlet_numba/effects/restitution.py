@@ -5,7 +5,7 @@ position is moved so that the particle leaves with the rebound's displacement; t
 """
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.effects.contact import risen
+from verlet_numba.effects.contact import instance, risen
 from verlet_numba.physics.restitution import impact
 
 
@@ -16,11 +16,12 @@ def foresee(position, acceleration, contact, restitution, h):
         return
     particle, solid, normal, bound, anchor = contact.particle, contact.solid, contact.normal, contact.bound, contact.anchor
     own, other, rebound = restitution.particle, restitution.solid, restitution.rebound
+    instances = other.size // contact.solids.kind.size
     x, y, z = position[0], position[1], position[2]
     for c in range(contact.listed[0]):
         k = particle[c]
         rebound[c] = 0.0
-        share = max(other[solid[c]], own[k])
+        share = max(other[solid[c] * instances + instance(k, instances)], own[k])
         after = risen(normal, c, x[k], y[k], z[k]) - bound[c]
         if share > 0.0 and after < 0.0:
             before = max(0.0, after - approach(normal, anchor, c, x[k], y[k], z[k]))

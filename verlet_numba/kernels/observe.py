@@ -6,8 +6,7 @@ import numpy as np
 
 from verlet_numba._jit import inlined, kernel
 from verlet_numba.buffers import (
-    ANGULAR,
-    CENTRE,
+    COLUMNS,
     CONTACTS,
     ERROR_MAX,
     ERROR_RMS,
@@ -15,63 +14,82 @@ from verlet_numba.buffers import (
     FALLEN,
     FALLEN_KEPT,
     KINETIC,
-    MOMENTUM,
-    POTENTIAL,
     RELAXATIONS,
     RELAXED,
     RELAXED_KEPT,
     SPEED_MAX,
-    TOTAL,
-    TOUCHING,
 )
+from verlet_numba.kernels.observe_beside import energies_beside, errors_beside, tell
 
 FAR = 1e30
 
 
 @kernel
 def keep(position, previous, snapshot, contacts):
-    """At a frame's time: keep the state that the next substep completes."""
+    """At a frame's time: keep the state that the next substep completes. contacts: of every instance."""
     for axis in range(3):
         place, before = snapshot.position[axis], snapshot.before[axis]
         now, earlier = position[axis], previous[axis]
         for k in range(now.size):
             place[k], before[k] = now[k], earlier[k]
     counts = snapshot.counts
-    counts[TOUCHING] = contacts
+    snapshot.touching[:] = contacts
     counts[RELAXED_KEPT], counts[RELAXED] = counts[RELAXED], 0
     counts[FALLEN_KEPT], counts[FALLEN] = counts[FALLEN], 0
 
 
 @kernel
-def record(output, values, order):
-    """Copy positions to a frame of the file, particle by particle in its order."""
-    x, y, z = values[0], values[1], values[2]
-    for p in range(order.size):
-        k = order[p]
-        output[p, 0], output[p, 1], output[p, 2] = x[k], y[k], z[k]
+def record(output, values, order, instances):
+    """Copy positions to a frame of the file, instance by instance and particle by particle in its order."""
+    x, y, z, row = values[0], values[1], values[2], 0
+    for i in range(instances):
+        for p in range(order.size):
+            k = order[p] + i
+            output[row, 0], output[row, 1], output[row, 2] = x[k], y[k], z[k]
+            row += 1
 
 
 @kernel
-def record_velocity(output, f, position, before, order, h):
+def record_velocity(output, f, position, before, order, instances, h):
     """Central differences about the frame's time: second order in the step. Only where the file asks for velocities."""
     if output is None:
         return
-    scale = 0.5 / h
-    for p in range(order.size):
-        k = order[p]
-        for axis in range(3):
-            output[f, p, axis] = (np.float64(position[axis, k]) - before[axis, k]) * scale
+    scale, row = 0.5 / h, 0
+    for i in range(instances):
+        for p in range(order.size):
+            k = order[p] + i
+            for axis in range(3):
+                output[f, row, axis] = (np.float64(position[axis, k]) - before[axis, k]) * scale
+            row += 1
 
 
 @kernel
-def observe(row, position, snapshot, observed, h):
-    """Energies, momenta and constraint errors of the kept frame, in double precision. False: not finite, or lost in space."""
-    row[:] = 0.0
-    energies(row, position, snapshot, observed, h)
-    constraint_errors(row, snapshot.position, observed.pairs, observed.rest)
-    row[CONTACTS], row[RELAXATIONS] = snapshot.counts[TOUCHING], snapshot.counts[RELAXED_KEPT]
-    row[FALLBACKS] = snapshot.counts[FALLEN_KEPT]
-    return np.isfinite(row[KINETIC]) and np.isfinite(row[ERROR_RMS]) and row[SPEED_MAX] < FAR and in_space(snapshot.position)
+def observe(measures, sound, position, snapshot, observed, h):
+    """Energies, momenta and constraint errors of the kept frame, in double precision, one instance after the other.
+
+    sound (I,): 0 where an instance is not finite, or lost in space. Returns whether any is sound.
+    """
+    measures[:] = 0.0
+    add_up(measures, position, snapshot, observed, observed.sums, h)
+    counts, nowhere_lost, some = snapshot.counts, in_space(snapshot.position), False
+    for i in range(observed.instances):
+        row = measures[i * COLUMNS:(i + 1) * COLUMNS]
+        row[CONTACTS], row[RELAXATIONS], row[FALLBACKS] = snapshot.touching[i], counts[RELAXED_KEPT], counts[FALLEN_KEPT]
+        sound[i] = (np.isfinite(row[KINETIC]) and np.isfinite(row[ERROR_RMS]) and row[SPEED_MAX] < FAR
+                    and (nowhere_lost or stays(snapshot.position, i, observed.instances)))
+        some = some or sound[i] > 0
+    return some
+
+
+@kernel
+def add_up(measures, position, snapshot, observed, sums, h):
+    """Energies, momenta and constraint errors."""
+    if sums is not None:
+        energies_beside(measures, position, snapshot, observed, h)
+        errors_beside(measures, snapshot.position, observed)
+        return
+    energies(measures, position, snapshot, observed, h)
+    constraint_errors(measures, snapshot.position, observed.pairs, observed.rest)
 
 
 @kernel
@@ -87,45 +105,41 @@ def in_space(position):
 
 
 @kernel
+def stays(position, i, instances):
+    """The same of one instance."""
+    for axis in range(3):
+        for k in range(i, position.shape[1], instances):
+            if not (abs(position[axis, k]) < FAR):
+                return False
+    return True
+
+
+@kernel
 def energies(row, position, snapshot, observed, h):
-    """Sums over the particles of the file; velocities by central difference (Hairer, Lubich, Wanner 2003, eq. 1.4)."""
+    """Sums over the particles of the file; velocities by central difference (Hairer, Lubich, Wanner 2003, eq. 1.4).
+
+    Displacements are summed first and made velocities at the end; observe_beside.py has the same arithmetic.
+    """
     (x, y, z), (u, v, w), (a, b, c) = rows(snapshot.position), rows(position), rows(snapshot.before)
-    order, mass, scale = observed.scene_order, observed.mass, 0.5 / h
-    total = fastest = kinetic = px = py = pz = lx = ly = lz = cx = cy = cz = 0.0
+    order, mass = observed.scene_order, observed.mass
+    total = fastest = squares = px = py = pz = lx = ly = lz = cx = cy = cz = 0.0
     for p in range(order.size):
         k, m = order[p], mass[p]
         rx, ry, rz = np.float64(x[k]), np.float64(y[k]), np.float64(z[k])
-        vx, vy, vz = (np.float64(u[k]) - a[k]) * scale, (np.float64(v[k]) - b[k]) * scale, (np.float64(w[k]) - c[k]) * scale
-        square = vx * vx + vy * vy + vz * vz
-        total, fastest, kinetic = total + m, max(fastest, square), kinetic + 0.5 * m * square
-        px, py, pz = px + m * vx, py + m * vy, pz + m * vz
-        lx, ly, lz = lx + m * (ry * vz - rz * vy), ly + m * (rz * vx - rx * vz), lz + m * (rx * vy - ry * vx)
+        dx, dy, dz = np.float64(u[k]) - a[k], np.float64(v[k]) - b[k], np.float64(w[k]) - c[k]
+        square = dx * dx + dy * dy + dz * dz
+        qx, qy, qz = m * dx, m * dy, m * dz
+        total, fastest, squares = total + m, max(fastest, square), squares + m * square
+        px, py, pz = px + qx, py + qy, pz + qz
+        lx, ly, lz = lx + (ry * qz - rz * qy), ly + (rz * qx - rx * qz), lz + (rx * qy - ry * qx)
         cx, cy, cz = cx + m * rx, cy + m * ry, cz + m * rz
-    whole = total if total > 0.0 else 1.0
-    row[KINETIC], row[POTENTIAL] = kinetic, potential(snapshot.position, order, mass, observed.gravity)
-    row[TOTAL], row[SPEED_MAX] = row[KINETIC] + row[POTENTIAL], math.sqrt(fastest)
-    row[MOMENTUM], row[MOMENTUM + 1], row[MOMENTUM + 2] = px, py, pz
-    row[ANGULAR], row[ANGULAR + 1], row[ANGULAR + 2] = lx, ly, lz
-    row[CENTRE], row[CENTRE + 1], row[CENTRE + 2] = cx / whole, cy / whole, cz / whole
+    tell(row, h, total, fastest, squares, px, py, pz, lx, ly, lz, cx, cy, cz, observed.gravity, 0)
 
 
 @inlined
 def rows(points):
     """The three rows of points (3, n)."""
     return points[0], points[1], points[2]
-
-
-@kernel
-def potential(position, order, mass, gravity):
-    """The sum of -m g . x [J], zero at the origin."""
-    if gravity is None:
-        return 0.0
-    energy = 0.0
-    for p in range(order.size):
-        k = order[p]
-        along = gravity[0, p] * position[0, k] + gravity[1, p] * position[1, k] + gravity[2, p] * position[2, k]
-        energy -= mass[p] * along
-    return energy
 
 
 @kernel

@@ -35,15 +35,16 @@ def relax_runs(position, runs, softness, tolerance, approximate):
         xi, yi, zi, xj, yj, zj = x[i:i + n], y[i:i + n], z[i:i + n], x[j:j + n], y[j:j + n], z[j:j + n]
         rest, gi, gj = runs.rest[d:d + n], runs.weight[0, d:d + n], runs.weight[1, d:d + n]
         for k in range(n):
-            dx, dy, dz = xj[k] - xi[k], yj[k] - yi[k], zj[k] - zi[k]
+            ax, ay, az, bx, by, bz = xi[k], yi[k], zi[k], xj[k], yj[k], zj[k]     # so that they are loaded once
+            dx, dy, dz = bx - ax, by - ay, bz - az
             f = returned(dx * dx + dy * dy + dz * dz + tiny, rest[k], approximate)
             fi, fj = f * gi[k], f * gj[k]
-            xi[k] += fi * dx
-            yi[k] += fi * dy
-            zi[k] += fi * dz
-            xj[k] -= fj * dx
-            yj[k] -= fj * dy
-            zj[k] -= fj * dz
+            xi[k] = ax + fi * dx
+            yi[k] = ay + fi * dy
+            zi[k] = az + fi * dz
+            xj[k] = bx - fj * dx
+            yj[k] = by - fj * dy
+            zj[k] = bz - fj * dz
     return runs.active
 
 
@@ -107,6 +108,14 @@ def relax_soft_runs(position, runs, softness, tolerance, approximate):
             xj[k] -= fj * dx
             yj[k] -= fj * dy
             zj[k] -= fj * dz
+    return counted(relaxed, runs.active, tolerance)
+
+
+@kernel
+def counted(relaxed, active, tolerance):
+    """How many constraints of an instance were relaxed: without a tolerance all that are active."""
+    if tolerance is None:
+        return active
     return relaxed
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from verlet_numba._jit import use_threads
-from verlet_numba.buffers import FRAME, NUMBER, PENETRATION, SUBSTEP, Array, Frames, Snapshot, World, gate
+from verlet_numba.buffers import COLUMNS, FRAME, NUMBER, PENETRATION, SUBSTEP, Array, Frames, Snapshot, World
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall
@@ -29,7 +29,7 @@ def start(model: Model) -> Model:
     x0 - v0 h alone would put an error of -g h t/2 into free fall.
     """
     particles, h = model.world.particles, model.world.solver.step
-    position, velocity = initial(model)
+    position, velocity = model.given()
     velocity *= particles.inverse_mass > 0
     particles.position[:] = position
     particles.previous[:] = position - velocity * h
@@ -49,27 +49,15 @@ def spread_over(model: Model, threads: int) -> Model:
     return model
 
 
-def initial(model: Model) -> tuple[Array, Array]:
-    """Positions [m] and velocities [m/s] (3, n) of the scene at time 0; pinned particles move as their path begins."""
-    position, velocity = (np.zeros(model.world.particles.position.shape) for _ in range(2))
-    for body, index in zip(model.bodies, model.numbering.bodies, strict=True):
-        held = np.zeros(3)
-        if body.path is not None and len(body.path) > 1 and body.path[0, 0] == 0.0:
-            held = (body.path[1, 1:] - body.path[0, 1:]) / (body.path[1, 0] - body.path[0, 0])
-        position[:, index] = np.moveaxis(body.positions, 2, 0)
-        velocity[:, index] = np.moveaxis(np.where(body.pinned[:, None], held, body.velocities), 2, 0)
-    return position, velocity
-
-
 def restate(model: Model, chunk: Frames) -> None:
     """Frame 0 is the scene's own start: its velocities are the given ones, not a difference that constraints have changed."""
-    world, h, row = model.world, model.world.solver.step, chunk.measures[0]
-    position, velocity = initial(model)
-    deepest = row[PENETRATION]
-    snapshot = Snapshot(position, position - h * velocity, gate(np.zeros(5), np.int64))
-    observe(row, position + h * velocity, snapshot, world.observed, h)
-    row[PENETRATION] = deepest
-    record_velocity(chunk.velocity, 0, position + h * velocity, snapshot.before, world.observed.scene_order, h)
+    world, h, measures = model.world, model.world.solver.step, chunk.measures[0]
+    (position, velocity), observed = model.given(), world.observed
+    deepest = measures[PENETRATION::COLUMNS].copy()
+    snapshot = Snapshot(position, position - h * velocity, *(np.zeros_like(counts) for counts in world.snapshot[2:]))
+    observe(measures, chunk.sound[0], position + h * velocity, snapshot, observed, h)
+    measures[PENETRATION::COLUMNS] = deepest
+    record_velocity(chunk.velocity, 0, position + h * velocity, snapshot.before, observed.scene_order, observed.instances, h)
 
 
 def accelerate(world: World) -> None:

@@ -24,6 +24,7 @@ from verlet_numba.run.trajectory import TEMPORARY, TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
 from verlet_numba.scene.plan import CHUNK_BYTES, file_bytes, frame_bytes, frame_count
 from verlet_numba.scene.prepare import Prepared
+from verlet_numba.scene.schema import Scene
 
 __all__ = ["BROKEN", "COMPLETE", "STOPPED", "Summary", "simulate"]
 
@@ -177,16 +178,8 @@ class Run:
 
     def store(self, file: TrajectoryFile, chunk: Frames, sound: int, took: float) -> None:
         """Hand the sound frames of a chunk, which took so many seconds, to the file and to the summary."""
-        clock, scene, summary = time.perf_counter(), self.prepared.scene, self.summary
-        if sound:
-            number = summary.frames + np.arange(sound)
-            fields: dict[str, Array] = {"position": chunk.position[:sound]}
-            if chunk.velocity is not None:
-                fields["velocity"] = chunk.velocity[:sound]
-            measures = chunk.measures[:sound]
-            file.append(number / scene.time.frame_rate, number * scene.solver.substeps, fields,
-                        observables(measures) if scene.output.observables else {})
-            summary.count(scene, measures)
+        clock, summary = time.perf_counter(), self.summary
+        store(self.prepared.scene, file, chunk, sound, summary)
         wrote = time.perf_counter() - clock
         summary.spend("simulate", took)
         summary.spend("write", wrote)
@@ -202,6 +195,19 @@ class Run:
         took = time.perf_counter() - clock
         self.summary.spend("write", took)
         self.due = clock + took + max(CHECKPOINT_SECONDS, CHECKPOINT_SHARE * took)
+
+
+def store(scene: Scene, file: TrajectoryFile, chunk: Frames, sound: int, summary: Summary) -> None:
+    """Hand the sound frames of a chunk to the file, and count them in the summary."""
+    if not sound:
+        return
+    number, measures = summary.frames + np.arange(sound), chunk.measures[:sound]
+    fields: dict[str, Array] = {"position": chunk.position[:sound]}
+    if chunk.velocity is not None:
+        fields["velocity"] = chunk.velocity[:sound]
+    file.append(number / scene.time.frame_rate, number * scene.solver.substeps, fields,
+                observables(measures) if scene.output.observables else {})
+    summary.count(scene, measures)
 
 
 def next_size(size: int, took: float) -> int:

@@ -46,8 +46,19 @@ class Model:
 
     @property
     def particles(self) -> int:
-        """Particles of the file."""
+        """Particles of the file, of one instance."""
         return len(self.world.observed.scene_order)
+
+    def given(self) -> tuple[Array, Array]:
+        """Positions [m] and velocities [m/s] (3, n) of the scene at time 0; pinned particles move as their path begins."""
+        position, velocity = (np.zeros(self.world.particles.position.shape) for _ in range(2))
+        for body, index in zip(self.bodies, self.numbering.bodies, strict=True):
+            held = np.zeros(3)
+            if body.path is not None and len(body.path) > 1 and body.path[0, 0] == 0.0:
+                held = (body.path[1, 1:] - body.path[0, 1:]) / (body.path[1, 0] - body.path[0, 0])
+            position[:, index] = np.moveaxis(body.positions, 2, 0)
+            velocity[:, index] = np.moveaxis(np.where(body.pinned[:, None], held, body.velocities), 2, 0)
+        return position, velocity
 
 
 def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
@@ -77,6 +88,7 @@ def build(scene: Scene, bodies: list[Body], folder: Path = Path()) -> Model:
     solver = Solver(step, scene.solver.substeps, passes,
                     scene.solver.tolerance or None, 1 if scene.solver.square_root == "approximate" else None)
     particles, snapshot = state(size, inverse_mass, effects, real)
+    effects = effects._replace(gravity=forces.beside_others(effects))
     observed = observed_of(scene, bodies, numbering)
     clock = gate(np.zeros(4), np.int64)
     clock[SUBSTEP] = scene.solver.substeps - 1        # frame 0 is the start itself: one substep completes it
@@ -116,11 +128,13 @@ def effects_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
 
 
 def state(size: int, inverse_mass: Floats, effects: Effects, real: Any) -> tuple[Particles, Snapshot]:
-    """Empty particles and snapshot; an acceleration only if something accelerates."""
-    accelerates = any(effect is not None for effect in (effects.gravity, effects.wind, effects.drag, effects.damping))
+    """Empty particles and snapshot; an acceleration only if something accelerates, gravity's where nothing else does."""
     rows = [gate(np.zeros((3, size)), real) for _ in range(5)]
-    particles = Particles(rows[0], rows[1], gate(inverse_mass, real), rows[2] if accelerates else None)
-    return particles, Snapshot(rows[3], rows[4], gate(np.zeros(5), np.int64))
+    acceleration = None if effects.gravity is None else effects.gravity.acceleration
+    if forces.others_accelerate(effects):
+        acceleration = rows[2]
+    particles = Particles(rows[0], rows[1], gate(inverse_mass, real), acceleration)
+    return particles, Snapshot(rows[3], rows[4], gate(np.zeros(4), np.int64), gate(np.zeros(1), np.int64))
 
 
 def observed_of(scene: Scene, bodies: list[Body], numbering: Numbering) -> Observed:
@@ -130,12 +144,10 @@ def observed_of(scene: Scene, bodies: list[Body], numbering: Numbering) -> Obser
     pairs = [index[:, body.shape.sticks.reshape(-1, 2)].reshape(-1, 2)
              for body, index in zip(bodies, numbering.bodies, strict=True)]
     rest = [np.tile(body.shape.lengths, body.copies) for body in bodies]
-    gravity = None
-    if scene.effects.gravity is not None:
-        gravity = gate(np.repeat(np.array(scene.effects.gravity, float)[:, None], len(order), 1), np.float64)
-    return Observed(gate(order, np.int64), gate(mass, np.float64), gravity,
+    gravity = None if scene.effects.gravity is None else gate(np.array(scene.effects.gravity, float)[:, None], np.float64)
+    return Observed(1, gate(order, np.int64), gate(mass, np.float64), gravity,
                     gate(np.concatenate([np.zeros((0, 2), np.int64), *pairs]).T, np.int64),
-                    gate(np.concatenate([np.zeros(0), *rest]), np.float64))
+                    gate(np.concatenate([np.zeros(0), *rest]), np.float64), None)
 
 
 def attachments(scene: Scene, bodies: list[Body], numbering: Numbering) -> Integers:
@@ -147,6 +159,8 @@ def attachments(scene: Scene, bodies: list[Body], numbering: Numbering) -> Integ
 
 def frames(model: Model, count: int) -> Frames:
     """Room for a chunk of frames."""
-    output, shape = model.scene.output, (count, model.particles, 3)
+    instances = model.world.observed.instances
+    output, shape = model.scene.output, (count, instances * model.particles, 3)
     velocity: Array | None = np.empty(shape, output.precision) if "velocity" in output.fields else None
-    return Frames(np.empty(shape, output.precision), velocity, np.empty((count, COLUMNS)))
+    return Frames(np.empty(shape, output.precision), velocity, np.empty((count, instances * COLUMNS)),
+                  np.empty((count, instances), np.int64))

@@ -140,8 +140,8 @@ def contacts(placed: Solids, bodies: list[Body], numbering: Numbering, size: int
     answers = belongs if whole else np.full(size, -1)
     remembered = REMEMBERED * size if whole else 0
     return Contacts(placed, gate(radius, real), gate(answers, np.int64), gate(belongs >= 0, np.int64),
-                    gate(np.zeros(BATCH), np.int64), margin(bodies), gate(np.zeros(1), np.int64), *room(FIRST_ROOM),
-                    gate(np.full(remembered, -1), np.int64), gate(np.zeros(remembered), np.float64),
+                    gate(np.zeros(BATCH), np.int64), gate(radius + margin(bodies), np.float64), gate(np.zeros(1), np.int64),
+                    *room(FIRST_ROOM), gate(np.full(remembered, -1), np.int64), gate(np.zeros(remembered), np.float64),
                     gate(np.zeros((3, remembered)), np.float64), gate(np.zeros(remembered), np.float64),
                     gate(np.full(remembered, NEVER), np.int64))
 

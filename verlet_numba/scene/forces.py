@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from verlet_numba import buffers
 from verlet_numba.buffers import Damping, Drag, Gravity, Wind, gate
 from verlet_numba.scene.body import Body, Floats
 from verlet_numba.scene.numbering import Numbering
@@ -20,6 +21,17 @@ def gravity(effects: Effects, inverse_mass: Floats, real: Any) -> Gravity | None
     if effects.gravity is None:
         return None
     return Gravity(lanes_of(effects.gravity, inverse_mass > 0, real))
+
+
+def others_accelerate(effects: buffers.Effects) -> bool:
+    """Whether anything but gravity does."""
+    return any(effect is not None for effect in (effects.wind, effects.drag, effects.damping))
+
+
+def beside_others(effects: buffers.Effects) -> Gravity | None:
+    """Gravity as the frame loop has it: alone it is an acceleration that is set once, before the first step."""
+    alone = effects.gravity is not None and not others_accelerate(effects)
+    return Gravity(None) if alone else effects.gravity
 
 
 def drag(effects: Effects, inverse_mass: Floats, real: Any) -> Drag | None:

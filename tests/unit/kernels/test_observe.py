@@ -16,14 +16,14 @@ def kept(request):
     after, place, before = rng.normal(size=(3, 3, 15)).astype(real)
     order = rng.permutation(15)[:10]
     pairs, rest = order[[[0, 2, 3], [1, 7, 4]]], np.array([1.0, 0.5, 0.0])
-    observed = b.Observed(order, rng.uniform(0.5, 2, 10), rng.normal(size=(3, 10)), pairs, rest)
-    return after, b.Snapshot(place, before, np.array([5, 3, 11, 2, 6])), observed
+    observed = b.Observed(1, order, rng.uniform(0.5, 2, 10), rng.normal(size=(3, 1)), pairs, rest, None)
+    return after, b.Snapshot(place, before, np.array([5, 11, 2, 6]), np.array([3])), observed
 
 
 def test_sums_over_the_particles_of_the_file(kept):
     after, snapshot, observed = kept
-    row = np.full(b.COLUMNS, np.nan)
-    assert observe(row, after, snapshot, observed, H)
+    row, sound = np.full(b.COLUMNS, np.nan), np.zeros(1, np.int64)
+    assert observe(row, sound, after, snapshot, observed, H)
     order, m = observed.scene_order, observed.mass[:, None]
     x = snapshot.position.T.astype(float)[order]
     v = (after.T.astype(float) - snapshot.before.T)[order] / (2 * H)
@@ -44,25 +44,25 @@ def test_sums_over_the_particles_of_the_file(kept):
 
 def test_what_is_not_a_number_or_lost_in_space_is_noticed(kept):
     after, snapshot, observed = kept
-    row, order = np.zeros(b.COLUMNS), observed.scene_order
+    row, sound, order = np.zeros(b.COLUMNS), np.zeros(1, np.int64), observed.scene_order
     for value in (np.nan, np.inf, -2e30):
         for array in (after, snapshot.position, snapshot.before):
             saved = array[1, order[4]]
             array[1, order[4]] = value
-            assert not observe(row, after, snapshot, observed, H)
+            assert not observe(row, sound, after, snapshot, observed, H)
             array[1, order[4]] = saved
-    assert observe(row, after, snapshot, observed, H)
+    assert observe(row, sound, after, snapshot, observed, H)
 
 
 def test_frames_are_in_the_order_of_the_file(kept):
     after, snapshot, observed = kept
     output = np.zeros((2, 10, 3), np.float32)
-    record(output[0], snapshot.position, observed.scene_order)
+    record(output[0], snapshot.position, observed.scene_order, 1)
     np.testing.assert_array_equal(output[0], snapshot.position.T[observed.scene_order].astype(np.float32))
-    record_velocity(output, 1, after, snapshot.before, observed.scene_order, H)
+    record_velocity(output, 1, after, snapshot.before, observed.scene_order, 1, H)
     expected = (after.T.astype(float) - snapshot.before.T)[observed.scene_order] / (2 * H)
     np.testing.assert_allclose(output[1], expected, rtol=1e-6)
-    record_velocity(None, 1, after, snapshot.before, observed.scene_order, H)
+    record_velocity(None, 1, after, snapshot.before, observed.scene_order, 1, H)
 
 
 def test_keep_copies_the_state_and_moves_the_counts_on(kept):
@@ -71,4 +71,5 @@ def test_keep_copies_the_state_and_moves_the_counts_on(kept):
     keep(after, previous, snapshot, 7)
     np.testing.assert_array_equal(snapshot.position, after)
     np.testing.assert_array_equal(snapshot.before, previous)
-    np.testing.assert_array_equal(snapshot.counts, [0, 7, 5, 0, 2])
+    np.testing.assert_array_equal(snapshot.counts, [0, 5, 0, 2])
+    np.testing.assert_array_equal(snapshot.touching, [7])
