@@ -227,7 +227,8 @@ class TrajectoryFile:
 
     def _begin(self) -> None:
         """A new file: nothing is stored, and nothing waits for its chunk to be full."""
-        self._appended = self._skip = self._stored = 0
+        self._appended = self._stored = 0
+        self._known = range(0)
         self._raw = False
         self._rest = _Block({path: np.zeros((0, *rows.id.shape[1:]), rows.dtype) for path, rows in self._rows.items()},
                             {name: np.zeros((0, *field.shape), self._contents.dtype) for name, field in self._fields.items()})
