@@ -15,7 +15,7 @@ MINUTES = {"time": {"duration": 100_000, "frame_rate": 60}, "bodies": [PENDULUM]
 COMPILING = """
 import sys, time
 import verlet_numba.run.simulate as simulation
-from verlet_numba.cli import main
+from verlet_numba.cli.main import main
 
 def warm(model):
     print("compiling", file=sys.stderr, flush=True)
