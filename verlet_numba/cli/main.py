@@ -30,8 +30,9 @@ def cli(debug: bool) -> None:
     """Position-based (Verlet) simulation of ropes, cloth and rigid bodies: YAML scenes in, HDF5 trajectories out."""
 
 
-for command in (simulate.run, simulate.sweep, scenes.check, scenes.plan, scenes.schema, scenes.warm, studies.accuracy, studies.verify,
-                trajectories.analyze, trajectories.compare, trajectories.render, trajectories.view, trajectories.export):
+for command in (simulate.run, simulate.sweep, scenes.check, scenes.plan, scenes.schema, scenes.warm, studies.accuracy,
+                studies.verify, trajectories.analyze, trajectories.compare, trajectories.render, trajectories.view,
+                trajectories.export):
     cli.add_command(command)
 
 
