@@ -86,6 +86,16 @@ def inlined(function: Function) -> Function:
     return _cached(function, inline="always")
 
 
+def threaded(function: Function) -> Function:
+    """Compile a function of which `prange` loops run on several threads, as many as `numba.set_num_threads` says."""
+    return _cached(function, parallel=True)
+
+
+def use_threads(count: int) -> None:
+    """Run `prange` loops on so many threads, or as many as there are processors."""
+    numba.set_num_threads(min(count, config.NUMBA_NUM_THREADS))
+
+
 def scan(function: Function) -> Function:
     """Compile a search for the greatest of finite numbers: it is exact in any order, so lanes of a vector may share it.
 

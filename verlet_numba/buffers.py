@@ -27,8 +27,8 @@ RELAXED, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3                 # Snapsh
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
-BESIDE = 64                                             # instances of a scene in one world, at most
-SUMS = 12 * BESIDE                                      # numbers of Observed.sums where there are several
+INSTANCES = 64                                             # instances of a scene in one world, at most
+SUMS = 12 * INSTANCES                                      # numbers of Observed.sums where there are several
 NO_ROOM = -2                                            # .listed of a list that had too little room
 
 
@@ -471,6 +471,22 @@ class Narrow(NamedTuple):
     seen: Array                 # (2S + 1,) int 1; of S corners: the flood that came by last, a queue; at the end: floods so far
 
 
+class Beside(NamedTuple):
+    """Scratch of the narrow phase on several threads: that of Narrow for every chunk of pairs."""
+
+    vertex: Array               # (J, 3, V) double m
+    label: Array                # (J, 2, V) int 1
+    weight: Array               # (J, 4) double 1
+    corner: Array               # (J, 3, F) int 1
+    across: Array               # (J, 3, F) int 1
+    plane: Array                # (J, 4, F) double 1
+    visible: Array              # (J, F) int 1
+    horizon: Array              # (J, 3F + 3) int 1
+    stack: Array                # (J, 3F + 3) int 1
+    seen: Array                 # (J, 2S + 1) int 1
+    found: Array                # (J,) int 1; where the chunk's meetings end
+
+
 class Manifold(NamedTuple):
     """Scratch of kernels/manifold.py, which gives pairs of hulls several contacts."""
 
@@ -508,6 +524,7 @@ class Meet(NamedTuple):
     spare: Pairs
     search: Search
     narrow: Narrow
+    beside: Beside | None       # None: one thread
     manifold: Manifold | None   # None: one contact a pair
     meetings: Meetings
     margin: float               # double m; how near two hulls are a contact

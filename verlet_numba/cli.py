@@ -51,7 +51,7 @@ def cli(debug: bool) -> None:
 @SETS
 @click.option("--frames", "count", type=click.IntRange(0), help="Frames after frame 0, instead of the scene's duration.")
 @click.option("--threads", type=click.IntRange(1), default=2, show_default=True,
-              help="Most threads to use: with 2, frames are written while the next are simulated.")
+              help="Threads: the results are the same. From 2 on, frames are written beside, and many bodies meet on several.")
 @OVERWRITE
 @AS_JSON
 @QUIET

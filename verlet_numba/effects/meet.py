@@ -7,6 +7,7 @@ from verlet_numba.kernels.candidates import FULL, refresh
 from verlet_numba.kernels.internal_edges import straighten
 from verlet_numba.kernels.manifold import widen
 from verlet_numba.kernels.narrow import collide, gather_hulls
+from verlet_numba.kernels.narrow_beside import collide_beside
 from verlet_numba.physics.pose import outward
 
 
@@ -50,18 +51,28 @@ def find_meetings(hulls, meet, rest):
     horizon, margin = meet.horizon, meet.margin
     if refresh(hulls, meet.still, meet.pairs, meet.spare, meet.search, margin, horizon, meet.all_pairs) == FULL:
         return False
-    if not collide_awake(hulls, meet, rest):
+    if not collide_awake(hulls, meet, meet.beside, rest):
         return False
     straighten(hulls, meet.pairs, meet.meetings, meet.ridges)
     return several(hulls, meet.pairs, meet.meetings, meet.manifold)
 
 
 @kernel
-def collide_awake(hulls, meet, rest):
+def collide_awake(hulls, meet, beside, rest):
     """The same of the pairs that are listed; those at rest need not meet each other."""
+    if beside is not None:
+        return collide_on_threads(hulls, meet, beside, rest)
     if rest is None:
         return collide(hulls, meet.pairs, meet.meetings, meet.narrow, meet.margin, meet.coherent)
     return collide(hulls, meet.pairs, meet.meetings, meet.narrow, meet.margin, meet.coherent, rest.quiet)
+
+
+@kernel
+def collide_on_threads(hulls, meet, beside, rest):
+    """The same; two that nothing moves are no pair, so `still` says that none is quiet."""
+    if rest is None:
+        return collide_beside(hulls, meet.pairs, meet.meetings, beside, meet.margin, meet.still)
+    return collide_beside(hulls, meet.pairs, meet.meetings, beside, meet.margin, rest.quiet)
 
 
 @kernel

@@ -154,15 +154,24 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent, quiet=None):
     coherent: None: every pair is met for the first time, and learns nothing. quiet (H,): two hulls that both are do not meet;
     None: none is. False is returned where there are more meetings than there is room for: grow and call again.
     """
-    points, centre, reach, rounding = hulls.corner, hulls.centre, hulls.reach, hulls.rounding
-    start, size, graph, neighbours, neighbour = hulls.start, hulls.size, hulls.graph, hulls.neighbours, hulls.neighbour
-    seen, vertex, label, weight = narrow.seen, narrow.vertex, narrow.label, narrow.weight
-    corner, across, plane, visible, horizon, stack = (narrow.corner, narrow.across, narrow.plane, narrow.visible, narrow.horizon,
-                                                      narrow.stack)
-    first, second, axis, face = pairs.first, pairs.second, pairs.axis, pairs.face
-    pair, columns, shares, normal, gap = meetings.pair, meetings.corner, meetings.weight, meetings.normal, meetings.gap
-    listed, fits = 0, True
-    for i in range(pairs.listed[0]):
+    meetings.listed[0] = collide_some(
+        hulls.corner, hulls.centre, hulls.reach, hulls.rounding, hulls.start, hulls.size, hulls.graph, hulls.neighbours,
+        hulls.neighbour, narrow.seen, narrow.vertex, narrow.label, narrow.weight, narrow.corner, narrow.across, narrow.plane,
+        narrow.visible, narrow.horizon, narrow.stack, pairs.first, pairs.second, pairs.axis, pairs.face, meetings.pair,
+        meetings.corner, meetings.weight, meetings.normal, meetings.gap, margin, coherent, quiet, 0, pairs.listed[0], 0,
+        meetings.gap.size)
+    return meetings.listed[0] != NO_ROOM
+
+
+@kernel
+def collide_some(points, centre, reach, rounding, start, size, graph, neighbours, neighbour, seen, vertex, label, weight, corner,
+                 across, plane, visible, horizon, stack, first, second, axis, face, pair, columns, shares, normal, gap, margin,
+                 coherent, quiet, begin, end, listed, room):
+    """Write the contacts of the pairs from `begin` to `end` as meetings number `listed` up to `room`.
+
+    Returns the number after the last, or NO_ROOM.
+    """
+    for i in range(begin, end):
         g, h = first[i], second[i]
         if quiet is not None and quiet[g] and quiet[h]:
             continue
@@ -215,11 +224,9 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent, quiet=None):
                 learn(axis, face, i, solid, sa, sb, a, b, c, d, e, f, nx, ny, nz)
         if -distance > bound:
             continue
-        if listed == gap.size:
-            fits = False
-            break
+        if listed == room:
+            return NO_ROOM
         pair[listed] = i
         write(points, columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
         listed += 1
-    meetings.listed[0] = listed if fits else NO_ROOM
-    return fits
+    return listed

@@ -6,18 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from verlet_numba._jit import use_threads
 from verlet_numba.buffers import COLUMNS, FRAME, NUMBER, PENETRATION, SUBSTEP, Array, Frames, Snapshot, World
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall
 from verlet_numba.effects.wind import blow
 from verlet_numba.frame import FULL, OK, PAUSED, advance
+from verlet_numba.kernels.narrow_beside import CHUNKS
 from verlet_numba.kernels.observe import observe, record_velocity
 from verlet_numba.scene.build import Model, frames
-from verlet_numba.scene.capacity import roomier
+from verlet_numba.scene.capacity import beside_of, roomier
 
 BUDGET = 64                 # substeps between two looks at signals, at first
 PAUSE_SECONDS = 0.1         # the budget doubles while it is done sooner
+MANY = 1000                 # hulls: fewer are soon done by one thread
 
 
 def start(model: Model) -> Model:
@@ -33,6 +36,16 @@ def start(model: Model) -> Model:
     if particles.acceleration is not None:
         accelerate(model.world)
         particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
+    return model
+
+
+def spread_over(model: Model, threads: int) -> Model:
+    """Have several threads find the contacts of many hulls; the result is the same, bit for bit."""
+    meet = model.world.effects.meet
+    if threads > 1 and meet is not None and meet.still.size >= MANY:
+        use_threads(threads)
+        meet = meet._replace(beside=beside_of(meet.narrow, CHUNKS))
+        model.world = model.world._replace(effects=model.world.effects._replace(meet=meet))
     return model
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from verlet_numba.buffers import CONTACTS, ERROR_MAX, FRAME, PENETRATION, RELAXATIONS, Array, Frames
 from verlet_numba.frame import DIVERGED, OK
 from verlet_numba.run.contents import contents, now, observables
-from verlet_numba.run.engine import State, run_chunk, start, warm
+from verlet_numba.run.engine import State, run_chunk, spread_over, start, warm
 from verlet_numba.run.postmortem import Divergence, examine
 from verlet_numba.run.progress import Progress
 from verlet_numba.run.signals import StopSignals
@@ -73,7 +73,7 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     total = frame_count(prepared.scene) if count is None else count + 1
     summary.seconds["build"] = time.perf_counter() - clock
     with Progress(total, prepared.scene.solver.substeps, quiet) as progress:
-        compile_kernels(model, progress, summary)
+        compile_kernels(spread_over(model, threads), progress, summary)
         with StopSignals() as signals, TrajectoryFile(output, contents(prepared, model, command), total, overwrite,
                                                       beside=threads > 1) as file:
             advance_all(model, file, total, progress, summary, signals)

@@ -9,6 +9,7 @@ from verlet_numba.buffers import (
     NO_ROOM,
     POINTS,
     Array,
+    Beside,
     Contacts,
     Effects,
     Hulls,
@@ -69,6 +70,12 @@ def narrow_of(hulls: Hulls) -> Narrow:
     faces, corners = 2 * POLYTOPE - 4, int(hulls.size.max(initial=0))
     return Narrow(real(3, POLYTOPE), whole(2, POLYTOPE), real(4), whole(3, faces), whole(3, faces), real(4, faces),
                   whole(faces), whole(3 * faces + 3), whole(3 * faces + 3), whole(2 * corners + 1))
+
+
+def beside_of(narrow: Narrow, chunks: int) -> Beside:
+    """The same for every chunk of pairs."""
+    copies = {name: gate(np.zeros((chunks, *array.shape)), array.dtype) for name, array in narrow._asdict().items()}
+    return Beside(**copies, found=whole(chunks))
 
 
 def manifold_of(corners: int, room: int) -> Manifold:

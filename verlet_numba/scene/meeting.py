@@ -179,7 +179,7 @@ def meet_of(scene: Scene, found: list[Solid], hulls: Hulls, still: Array) -> Mee
     as_whole = scene.solver.response == "body"
     manifold = manifold_of(int(hulls.size.max()), FIRST_ROOM) if as_whole and rests_on_faces(hulls) else None
     return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
-                narrow_of(hulls), manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
+                narrow_of(hulls), None, manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
                 min(scene.solver.substeps, LASTING) if scene.solver.substeps > 1 else 0, 1,
                 1 if scene.solver.broad_phase == "all_pairs" else None,
                 ridges_of(found, hulls))

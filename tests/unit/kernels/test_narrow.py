@@ -1,5 +1,6 @@
 """Contacts of pairs: against the whole difference of the hulls, with and without what was learnt before."""
 
+import numba
 import numpy as np
 import pytest
 from hull_pairs import box, difference_depth, hulls_of, meet, meetings_for, pairs_of, rotated, witnesses
@@ -7,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.kernels.narrow import collide, gather_hulls
+from verlet_numba.kernels.narrow_beside import CHUNKS, collide_beside
+from verlet_numba.scene.capacity import beside_of
 from verlet_numba.scene.capacity import narrow_of as scratch
 
 PAIRS, MARGIN = 150, 0.5
@@ -64,10 +68,40 @@ def test_full_meetings_say_so_and_the_call_may_be_repeated(crowd):
     _, hulls, pairs = crowd
     small, large, narrow = meetings_for(7), meetings_for(PAIRS), scratch(hulls)
     assert not collide(hulls, pairs, small, narrow, MARGIN, True)
-    assert small.listed[0] == 7
+    assert small.listed[0] == NO_ROOM
     assert collide(hulls, pairs, large, narrow, MARGIN, True)
     np.testing.assert_array_equal(large.pair[:7], small.pair)
     np.testing.assert_allclose(large.gap[:7], small.gap, atol=1e-12)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("count", [0, 5, PAIRS])
+def test_threads_find_the_very_contacts_of_one(crowd, threads, count):
+    """Fewer pairs than chunks, and more; twice, since what a pair learnt is where the next substep begins."""
+    (_, hulls, pairs), pairs_beside = crowd, pairs_of(range(PAIRS), range(PAIRS, 2 * PAIRS))
+    before = numba.get_num_threads()
+    numba.set_num_threads(threads)
+    quiet = np.arange(2 * PAIRS) % 5 == 0
+    quiet[PAIRS:] = quiet[:PAIRS]
+    pairs.listed[0] = pairs_beside.listed[0] = count
+    for _ in range(2):
+        alone, beside = meetings_for(PAIRS), meetings_for(PAIRS)
+        assert collide(hulls, pairs, alone, scratch(hulls), MARGIN, 1, quiet.astype(np.int64))
+        assert collide_beside(hulls, pairs_beside, beside, beside_of(scratch(hulls), CHUNKS), MARGIN, quiet.astype(np.int64))
+        found = alone.listed[0]
+        assert found >= 0.2 * count
+        for one, other in zip(alone, beside, strict=True):
+            np.testing.assert_array_equal(one[..., :found] if one.ndim else one, other[..., :found] if other.ndim else other)
+        np.testing.assert_array_equal(pairs.axis, pairs_beside.axis)
+        np.testing.assert_array_equal(pairs.face, pairs_beside.face)
+    numba.set_num_threads(before)
+
+
+def test_threads_want_room_for_a_meeting_of_every_pair(crowd):
+    _, hulls, pairs = crowd
+    small = meetings_for(PAIRS - 1)
+    assert not collide_beside(hulls, pairs, small, beside_of(scratch(hulls), CHUNKS), MARGIN, np.zeros(2 * PAIRS, np.int64))
+    assert small.listed[0] == NO_ROOM
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
