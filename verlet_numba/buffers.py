@@ -27,8 +27,8 @@ RELAXED, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3                 # Snapsh
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
-BESIDE = 64                                             # instances of a scene in one world, at most
-SUMS = 12 * BESIDE                                      # numbers of Observed.sums where there are several
+INSTANCES = 64                                             # instances of a scene in one world, at most
+SUMS = 12 * INSTANCES                                      # numbers of Observed.sums where there are several
 NO_ROOM = -2                                            # .listed of a list that had too little room
 
 

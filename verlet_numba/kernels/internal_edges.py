@@ -19,7 +19,7 @@ from verlet_numba.physics.rigid import cross
 
 BEHIND = 1e-7           # sine of the angle by which the surface may rise over the plane behind it
 CARRIED = 1e-9          # weight of a corner below which a contact is not on it
-BESIDE = 1e-6           # of the distance from the triangle: a point that is no farther aside is above it
+INSTANCES = 1e-6           # of the distance from the triangle: a point that is no farther aside is above it
 
 
 @kernel
@@ -65,7 +65,7 @@ def straighten(hulls, pairs, meetings, ridges):
             wa, wb, wc, squared = on_triangle(x[k], y[k], z[k], x[b], y[b], z[b], x[b + 1], y[b + 1], z[b + 1],
                                               x[b + 2], y[b + 2], z[b + 2])
             height = ux * (x[k] - x[b]) + uy * (y[k] - y[b]) + uz * (z[k] - z[b])
-            if best < 0.0 or squared - height * height <= BESIDE * BESIDE * squared:
+            if best < 0.0 or squared - height * height <= INSTANCES * INSTANCES * squared:
                 corner[0, m], corner[1, m], corner[2, m], corner[3, m], corner[4, m], corner[5, m] = k, k, k, b, b + 1, b + 2
                 weight[0, m], weight[1, m], weight[2, m] = 1.0, 0.0, 0.0
                 weight[3, m], weight[4, m], weight[5, m] = wa, wb, wc

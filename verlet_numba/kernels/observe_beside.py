@@ -1,6 +1,6 @@
 """Observables of several instances side by side: vector lanes, each in the arithmetic and the order of one alone.
 
-Sums stand in one scratch array, those of a kind BESIDE numbers after those of the last: a distance that the compiler
+Sums stand in one scratch array, those of a kind INSTANCES numbers after those of the last: a distance that the compiler
 knows, so that it need not ask for every row of lanes whether sums overlap.
 """
 
@@ -11,11 +11,11 @@ import numpy as np
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import (
     ANGULAR,
-    BESIDE,
     CENTRE,
     COLUMNS,
     ERROR_MAX,
     ERROR_RMS,
+    INSTANCES,
     KINETIC,
     MOMENTUM,
     POTENTIAL,
@@ -27,7 +27,7 @@ from verlet_numba.buffers import (
 @kernel
 def energies_beside(measures, position, snapshot, observed, h):
     """As `energies`, of all instances."""
-    s, n, b = observed.sums, observed.instances, BESIDE
+    s, n, b = observed.sums, observed.instances, INSTANCES
     moments(s, position, snapshot.position, snapshot.before, observed.scene_order, observed.mass, n)
     for i in range(n):
         tell(measures[i * COLUMNS:(i + 1) * COLUMNS], h, s[i], s[b + i], s[2 * b + i], s[3 * b + i], s[4 * b + i], s[5 * b + i],
@@ -69,17 +69,17 @@ def moments(sums, position, middle, before, order, mass, n):
             square = dx * dx + dy * dy + dz * dz
             qx, qy, qz = m * dx, m * dy, m * dz
             sums[i] += m
-            sums[BESIDE + i] = max(sums[BESIDE + i], square)
-            sums[2 * BESIDE + i] += m * square
-            sums[3 * BESIDE + i] += qx
-            sums[4 * BESIDE + i] += qy
-            sums[5 * BESIDE + i] += qz
-            sums[6 * BESIDE + i] += ry * qz - rz * qy
-            sums[7 * BESIDE + i] += rz * qx - rx * qz
-            sums[8 * BESIDE + i] += rx * qy - ry * qx
-            sums[9 * BESIDE + i] += m * rx
-            sums[10 * BESIDE + i] += m * ry
-            sums[11 * BESIDE + i] += m * rz
+            sums[INSTANCES + i] = max(sums[INSTANCES + i], square)
+            sums[2 * INSTANCES + i] += m * square
+            sums[3 * INSTANCES + i] += qx
+            sums[4 * INSTANCES + i] += qy
+            sums[5 * INSTANCES + i] += qz
+            sums[6 * INSTANCES + i] += ry * qz - rz * qy
+            sums[7 * INSTANCES + i] += rz * qx - rx * qz
+            sums[8 * INSTANCES + i] += rx * qy - ry * qx
+            sums[9 * INSTANCES + i] += m * rx
+            sums[10 * INSTANCES + i] += m * ry
+            sums[11 * INSTANCES + i] += m * rz
 
 
 @kernel
@@ -98,9 +98,9 @@ def errors_beside(measures, position, observed):
             counts = lengths[i] > 0.0
             error = error if counts else 0.0
             sums[i] = max(sums[i], error)
-            sums[BESIDE + i] += error * error
-            sums[2 * BESIDE + i] += 1.0 if counts else 0.0
+            sums[INSTANCES + i] += error * error
+            sums[2 * INSTANCES + i] += 1.0 if counts else 0.0
     for i in range(n):
-        counted = sums[2 * BESIDE + i]
+        counted = sums[2 * INSTANCES + i]
         measures[i * COLUMNS + ERROR_MAX] = sums[i]
-        measures[i * COLUMNS + ERROR_RMS] = math.sqrt(sums[BESIDE + i] / counted) if counted > 0 else 0.0
+        measures[i * COLUMNS + ERROR_RMS] = math.sqrt(sums[INSTANCES + i] / counted) if counted > 0 else 0.0

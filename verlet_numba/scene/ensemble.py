@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import BESIDE, SUMS, Array, Runs, Softness, Sticks, World, gate
+from verlet_numba.buffers import INSTANCES, SUMS, Array, Runs, Softness, Sticks, World, gate
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.numbering import padded
 
@@ -52,7 +52,7 @@ class Ensemble(Model):
 
 
 def together(members: list[Model]) -> Ensemble:
-    """The model of scenes that `likeness` finds alike, at most BESIDE of them. It takes over the buffers of the first."""
+    """The model of scenes that `likeness` finds alike, at most INSTANCES of them. It takes over the buffers of the first."""
     first, sums = members[0], gate(np.zeros(SUMS), np.float64) if len(members) > 1 else None
     worlds = [in_runs(member.world) for member in members]
     real = first.world.particles.position.dtype
@@ -160,4 +160,4 @@ def leaves(path: str, part: Any) -> Iterator[tuple[str, Any]]:
 def most_beside(model: Model, bytes_a_block: int) -> int:
     """How many instances of a scene make a block of about so many bytes."""
     own: int = sum(value.nbytes for path, value in leaves("", model.world) if path in PARTICLES | VALUES and value is not None)
-    return min(BESIDE, max(1, bytes_a_block // max(own, 1)))
+    return min(INSTANCES, max(1, bytes_a_block // max(own, 1)))

@@ -8,7 +8,7 @@ import worlds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verlet_numba.buffers import BESIDE, COLUMNS
+from verlet_numba.buffers import COLUMNS, INSTANCES
 from verlet_numba.run.engine import run_chunk, start
 from verlet_numba.scene.build import frames
 from verlet_numba.scene.ensemble import in_runs, likeness, most_beside, together
@@ -99,7 +99,7 @@ def test_an_instance_has_the_bits_of_its_scene_alone(changes):
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-@pytest.mark.parametrize("count", [2, 8, 17, BESIDE])
+@pytest.mark.parametrize("count", [2, 8, 17, INSTANCES])
 def test_so_many_ropes_and_arms_that_fall(count, precision):
     """Numbers of whole vectors and others; gravity alone. Single sticks alone are runs beside others."""
     rope, arm = worlds.FREE["bodies"]
@@ -159,4 +159,4 @@ def test_single_sticks_follow_the_runs():
 def test_blocks_have_at_least_one_instance_and_not_too_many():
     model = worlds.built(SOFT)
     assert most_beside(model, 1) == 1
-    assert most_beside(model, 1 << 40) == BESIDE
+    assert most_beside(model, 1 << 40) == INSTANCES
