@@ -143,6 +143,10 @@ class State:
         if effects.mixed is not None:
             mixed = effects.mixed
             arrays += [*mixed.candidates, mixed.at, *mixed.pairs, *mixed.meetings]
+        if effects.exact is not None:
+            exact = effects.exact
+            arrays += [*exact.gaps, exact.tally, *(part for listing in (exact.among, exact.against) if listing is not None
+                                                   for part in listing[2:])]
         if rest is not None:
             arrays += [rest.awake, rest.free, rest.anchor, rest.quiet, rest.resting, rest.slow, rest.since, rest.island, rest.depth]
         return tuple(arrays)

@@ -4,6 +4,7 @@ import numpy as np
 
 from verlet_numba.buffers import POINTS, Array, Effects, Hulls, Manifold, Meetings, Narrow, Pairs, Search, gate
 from verlet_numba.scene.colliders import room
+from verlet_numba.scene.exact import roomier_exact
 from verlet_numba.scene.rigid import touches_of, with_room
 from verlet_numba.scene.sphere_trees import candidates_of
 
@@ -94,7 +95,7 @@ def roomier(effects: Effects) -> Effects:
         entities = rigid.bodies + touching + 1
         rigid = with_room(rigid, entities)
         touches = touches_of(touching, rigid.size.size)
-    return effects._replace(contact=contact, meet=meet, spheres=spheres, mixed=mixed, rigid=rigid, touches=touches,
+    return effects._replace(exact=roomier_exact(effects.exact), contact=contact, meet=meet, spheres=spheres, mixed=mixed, rigid=rigid, touches=touches,
                             restitution=restitution)
 
 

@@ -49,7 +49,8 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
 
 def bodies_meet(world: World) -> bool:
     """Whether any two bodies may touch."""
-    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed))
+    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed,
+                                                   world.effects.exact))
 
 
 def frame_count(scene: Scene) -> int:

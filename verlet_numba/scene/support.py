@@ -34,10 +34,8 @@ def _is_not(word: object) -> Callable[[Any], bool]:
 _LEAVE_OUT = "leave the key out"
 
 NOT_BUILT = (
-    Missing("solver.deformable_contact", _is("exact"), "use `spheres`"),
     Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
     Missing("effects.bending", _named, _LEAVE_OUT),
-    Missing("bodies.*.contact_geometry", _is("segments"), "use `nodes`"),
 )
 
 

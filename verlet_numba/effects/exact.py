@@ -1,0 +1,439 @@
+"""Exact contact of deformable bodies: vertices with triangles and edges with edges, among each other, with themselves, with
+rigid bodies and with colliders, both ways.
+
+Once a substep the closest points of features near each other are taken at its *start*, a state without intersections, and
+the unit vector between them. After the relaxation these gaps are gone through once: what has come nearer than both radii
+along that vector is moved apart, each point by its weight and inverse mass, rigid bodies as a whole, so that momentum is
+kept. Contact has the last word, and what the substep itself has brought nearer is also what friction acts on; overlap that
+stood already is shifted without becoming speed.
+
+**Nothing passes through.** A gap is safe if one fixed plane keeps its two features apart at the start and at the end of
+their straight ways: then it does so on the way, and whatever part of its step each point takes. Points of any other gap may
+go HOLD of the gap at most, so that what is left of it is more than nothing. And no point gets farther than the step that
+gaps were looked for with. So every way taken is free of crossings, as long as what paths prescribe leaves room. After Wu,
+Wang & Wang 2020 (A Safe and Fast Repulsion Method for GPU-based Cloth Self Collisions) and Chen, Diaz, Yuksel 2025 (Offset
+Geometric Contact), which bound the step of every vertex by its distances.
+"""
+
+import math
+
+import numpy as np
+
+from verlet_numba._jit import inlined, kernel
+from verlet_numba.effects.contact import separate
+from verlet_numba.effects.friction import coefficients
+from verlet_numba.effects.touch import weigh_one
+from verlet_numba.kernels.near_features import find_gaps, list_features
+from verlet_numba.kernels.pieces import list_against_others, list_among, update_edges, update_pieces
+from verlet_numba.physics.friction import held
+from verlet_numba.physics.rigid import cross, times_symmetric
+
+GROWTH = 1.25           # times the step that a point is about to take: how far it may get, with the floor added
+LASTING = 4.0           # steps that a list shall last
+SLACK = 4.0             # times the floor: the least slack of a point
+HOLD = 0.45             # of a gap: how far its points may go if no plane keeps them apart; below one half
+LEAST = 0.1             # of a gap: what a plane has to leave of it
+
+
+@kernel
+def find_exact(position, previous, contact, exact):
+    """List the gaps that may close in this substep. False: no room (grow and call again)."""
+    if exact is None:
+        return True
+    points, gaps = exact.points, exact.gaps
+    bring(position, previous, points)
+    bring_corners(contact, points)
+    mean_step(points, exact.among, exact.drift)
+    gaps.listed[0] = 0
+    if not find_against(exact):
+        return False
+    if gaps.listed[0] > 0:                  # what stands still is near: steps are bounded as they are
+        exact.drift[0] = exact.drift[1] = exact.drift[2] = 0.0
+    return find_among(exact)
+
+
+@kernel
+def bring(position, previous, points):
+    """The particles where they are, and where they were at the start of the substep."""
+    start, now, shift = points.start, points.now, points.shift
+    for i in range(3):
+        x, u = position[i], previous[i]
+        for k in range(x.size):
+            now[k, i], start[k, i], shift[k, i] = x[k], u[k], 0.0
+
+
+@kernel
+def bring_corners(contact, points):
+    """The corners of colliders, at the start and at the end of the substep."""
+    if contact is None:
+        return
+    solids, start, now, local, first = contact.solids, points.start, points.now, points.local, points.now.shape[0] - points.solid.size
+    for c in range(points.solid.size):
+        s = points.solid[c]
+        for i in range(3):
+            now[first + c, i], start[first + c, i] = solids.origin[i, s], solids.origin_before[i, s]
+            for j in range(3):
+                now[first + c, i] += solids.rotation[i, j, s] * local[j, c]
+                start[first + c, i] += solids.rotation_before[i, j, s] * local[j, c]
+
+
+@kernel
+def mean_step(points, among, drift):
+    """The mean step of the deformable bodies' particles; none where they do not meet."""
+    if among is None:
+        return
+    start, now, soft = points.start, points.now, points.soft
+    x = y = z = 0.0
+    for p in soft:
+        x, y, z = x + (now[p, 0] - start[p, 0]), y + (now[p, 1] - start[p, 1]), z + (now[p, 2] - start[p, 2])
+    drift[0], drift[1], drift[2] = x / soft.size, y / soft.size, z / soft.size
+
+
+@kernel
+def find_against(exact):
+    """Gaps of deformable bodies with rigid ones and colliders. False: no room."""
+    listing = exact.against
+    if listing is None:
+        return True
+    points, drift = exact.points, exact.drift
+    bound_steps(points.start, points.now, drift, math.sqrt(drift[0]**2 + drift[1]**2 + drift[2]**2), exact.floor, listing.step)
+    if outdated(listing):
+        renew(points, exact.pieces, exact.floor, listing)
+        exact.tally[0] += 1
+        if not (list_against_others(exact.pieces, listing.stack, listing.pairs)
+                and list_features(points.start, points, exact.pieces, listing)):
+            return False
+    return find_gaps(points, listing, exact.gaps)
+
+
+@kernel
+def find_among(exact):
+    """Gaps between deformable bodies. False: no room."""
+    listing = exact.among
+    if listing is None:
+        return True
+    points = exact.points
+    bound_steps(points.start, points.now, exact.drift, 0.0, exact.floor, listing.step)
+    if outdated(listing):
+        renew(points, exact.pieces, exact.floor, listing)
+        update_edges(points.start, exact.pieces)
+        exact.tally[0] += 1
+        if not (list_among(exact.pieces, exact.itself, listing.stack, listing.pairs)
+                and list_features(points.start, points, exact.pieces, listing)):
+            return False
+    return find_gaps(points, listing, exact.gaps)
+
+
+@kernel
+def bound_steps(start, now, drift, beside, floor, step):
+    """How far every point may get in this substep, relative to the drift: a little farther than it is about to."""
+    u, v, w = drift[0], drift[1], drift[2]
+    for p in range(step.size):
+        x, y, z = now[p, 0] - start[p, 0] - u, now[p, 1] - start[p, 1] - v, now[p, 2] - start[p, 2] - w
+        step[p] = GROWTH * (math.sqrt(x * x + y * y + z * z) + beside) + floor
+
+
+@kernel
+def outdated(listing):
+    """Whether a list is yet to be made, or a point may use up its slack in this substep."""
+    path, step, slack = listing.path, listing.step, listing.slack
+    kept = 0
+    for p in range(path.size):
+        kept += path[p] + step[p] <= slack[p]
+    return listing.made[0] < 0 or kept < path.size
+
+
+@kernel
+def renew(points, pieces, floor, listing):
+    """A list is to be made from where the points are at the start: their ways begin anew."""
+    path, step, slack = listing.path, listing.step, listing.slack
+    listing.made[0] = -1
+    for p in range(path.size):
+        path[p], slack[p] = 0.0, max(SLACK * floor, LASTING * step[p])
+    update_pieces(points.start, points.radius, slack, pieces)
+
+
+@kernel
+def part_exact(position, previous, inverse_mass, contact, exact):
+    """Move features apart that have come nearer than their reach, after the relaxation: gap by gap, the last found first."""
+    if exact is None:
+        return
+    points, gaps = exact.points, exact.gaps
+    if gaps.listed[0] > 0:
+        now = points.now
+        for i in range(3):
+            x = position[i]
+            for k in range(x.size):
+                now[k, i] = x[k]
+        begin_wholes(exact.wholes)
+        for g in range(gaps.listed[0] - 1, -1, -1):
+            open_gap(position, previous, inverse_mass, points, exact.wholes, gaps, g)
+        take_back(position, previous, points)
+    separate(position, contact)
+
+
+@kernel
+def begin_wholes(wholes):
+    if wholes is None:
+        return
+    for b in range(wholes.stamp.size):
+        wholes.stamp[b] = 0
+
+
+@kernel
+def open_gap(position, previous, inverse_mass, points, wholes, gaps, g):
+    """Open a gap to its reach along its normal, and take back sliding within the cone of friction."""
+    now, start, free, gap, reach = points.now, points.start, points.free, gaps.gap[g], gaps.reach[g]
+    a, b, c, d = gaps.point[g, 0], gaps.point[g, 1], gaps.point[g, 2], gaps.point[g, 3]
+    p, q, r, s = gaps.weight[g, 0], gaps.weight[g, 1], gaps.weight[g, 2], gaps.weight[g, 3]
+    nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
+    x = p * now[a, 0] + q * now[b, 0] + r * now[c, 0] + s * now[d, 0]
+    y = p * now[a, 1] + q * now[b, 1] + r * now[c, 1] + s * now[d, 1]
+    z = p * now[a, 2] + q * now[b, 2] + r * now[c, 2] + s * now[d, 2]
+    push = reach - (x * nx + y * ny + z * nz)
+    if not push > 0.0:
+        return
+    give = p * p * free[a] + q * q * free[b] + r * r * free[c] + s * s * free[d]
+    give += give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz)
+    if not give > 0.0:
+        return
+    standing = min(push, max(0.0, reach - gap))
+    fresh = push - standing
+    gaps.push[g] = fresh
+    fx, fy, fz = push * nx, push * ny, push * nz
+    sx = x - (p * start[a, 0] + q * start[b, 0] + r * start[c, 0] + s * start[d, 0])
+    sy = y - (p * start[a, 1] + q * start[b, 1] + r * start[c, 1] + s * start[d, 1])
+    sz = z - (p * start[a, 2] + q * start[b, 2] + r * start[c, 2] + s * start[d, 2])
+    share = grip(points.friction, a, d, sx, sy, sz, nx, ny, nz, fresh)
+    along = sx * nx + sy * ny + sz * nz
+    fx, fy, fz = fx - share * (sx - along * nx), fy - share * (sy - along * ny), fz - share * (sz - along * nz)
+    fx, fy, fz = fx / give, fy / give, fz / give
+    standing /= give
+    tx, ty, tz = standing * nx, standing * ny, standing * nz
+    shove_point(now, points.shift, a, p * free[a], fx, fy, fz, tx, ty, tz)
+    shove_point(now, points.shift, b, q * free[b], fx, fy, fz, tx, ty, tz)
+    shove_point(now, points.shift, c, r * free[c], fx, fy, fz, tx, ty, tz)
+    shove_point(now, points.shift, d, s * free[d], fx, fy, fz, tx, ty, tz)
+    shove_whole(points, wholes, gaps, g, fx, fy, fz, tx, ty, tz)
+
+
+@inlined
+def shove_point(now, shift, k, by, fx, fy, fz, tx, ty, tz):
+    """Move point k by its share of the impulse f; of it the part t makes no speed."""
+    now[k, 0] += by * fx
+    now[k, 1] += by * fy
+    now[k, 2] += by * fz
+    shift[k, 0] += by * tx
+    shift[k, 1] += by * ty
+    shift[k, 2] += by * tz
+
+
+@kernel
+def grip(friction, a, d, sx, sy, sz, nx, ny, nz, push):
+    """Which part of the slide across the normal friction takes back."""
+    if friction is None:
+        return 0.0
+    along = sx * nx + sy * ny + sz * nz
+    sx, sy, sz = sx - along * nx, sy - along * ny, sz - along * nz
+    slide = math.sqrt(sx * sx + sy * sy + sz * sz)
+    if slide == 0.0:
+        return 0.0
+    static, dynamic = coefficients(friction, friction, a, d)
+    return held(slide, push, static, dynamic)
+
+
+@kernel
+def give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz):
+    """How a rigid body gives way to a unit impulse along the normal at its side of the gap: 1/M + (r x n) . I^-1 (r x n)."""
+    if wholes is None:
+        return 0.0
+    e, side, x, y, z = whole_side(points, gaps, g)
+    if e < 0:
+        return 0.0
+    if wholes.stamp[e] == 0:
+        wholes.stamp[e] = 1
+        begin, by = wholes.first[e], wholes.stride[e]
+        weighed = weigh_one(position[0], position[1], position[2], previous[0], previous[1], previous[2], inverse_mass, begin,
+                            begin + wholes.size[e] * by, by)
+        for column in range(10):
+            wholes.mass[e, column] = weighed[column]
+    m = wholes.mass
+    tx, ty, tz = cross(x - m[e, 1], y - m[e, 2], z - m[e, 3], nx, ny, nz)
+    ox, oy, oz = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], tx, ty, tz)
+    return m[e, 0] + tx * ox + ty * oy + tz * oz
+
+
+@kernel
+def whole_side(points, gaps, g):
+    """The rigid body of a gap, -1 if it has none, the sign of its side, and its closest point."""
+    for k in range(4):
+        e = points.whole[gaps.point[g, k]]
+        if e >= 0:
+            sign = 1.0 if k == 0 or (k == 1 and gaps.edges[g] == 1) else -1.0
+            x = y = z = 0.0
+            for l in range(4):
+                if points.whole[gaps.point[g, l]] >= 0:
+                    p, w = gaps.point[g, l], sign * gaps.weight[g, l]
+                    x, y, z = x + w * points.now[p, 0], y + w * points.now[p, 1], z + w * points.now[p, 2]
+            return e, sign, x, y, z
+    return -1, 0.0, 0.0, 0.0, 0.0
+
+
+@kernel
+def shove_whole(points, wholes, gaps, g, fx, fy, fz, tx, ty, tz):
+    """Move the rigid body of a gap by the twist that the impulse f gives it; of it the part t makes no speed."""
+    if wholes is None:
+        return
+    e, sign, x, y, z = whole_side(points, gaps, g)
+    if e < 0:
+        return
+    m, now, shift = wholes.mass, points.now, points.shift
+    cx, cy, cz, by = m[e, 1], m[e, 2], m[e, 3], m[e, 0] * sign
+    ax, ay, az = cross(x - cx, y - cy, z - cz, sign * fx, sign * fy, sign * fz)
+    ax, ay, az = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], ax, ay, az)
+    qx, qy, qz = cross(x - cx, y - cy, z - cz, sign * tx, sign * ty, sign * tz)
+    qx, qy, qz = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], qx, qy, qz)
+    first, stride = wholes.first[e], wholes.stride[e]
+    for k in range(first, first + wholes.size[e] * stride, stride):
+        dx, dy, dz = now[k, 0] - cx, now[k, 1] - cy, now[k, 2] - cz
+        ux, uy, uz = cross(ax, ay, az, dx, dy, dz)
+        vx, vy, vz = cross(qx, qy, qz, dx, dy, dz)
+        now[k, 0] += by * fx + ux
+        now[k, 1] += by * fy + uy
+        now[k, 2] += by * fz + uz
+        shift[k, 0] += by * tx + vx
+        shift[k, 1] += by * ty + vy
+        shift[k, 2] += by * tz + vz
+
+
+@kernel
+def take_back(position, previous, points):
+    """The particles where contact has moved them; what makes no speed moves their previous places along."""
+    now, shift = points.now, points.shift
+    for i in range(3):
+        x, u = position[i], previous[i]
+        for k in range(x.size):
+            x[k] = now[k, i]
+            u[k] += shift[k, i]
+
+
+@kernel
+def limit_exact(position, exact):
+    """Hold points back that might pass through something on their way, and note the ways taken. Nothing comes after it."""
+    if exact is None:
+        return
+    points, drift, scale = exact.points, exact.drift, exact.scale
+    now, start = points.now, points.start
+    for i in range(3):
+        x = position[i]
+        for k in range(x.size):
+            now[k, i] = x[k]
+    for k in range(scale.size):
+        scale[k] = 1.0
+    bound_gaps(points, drift, exact.gaps, scale)
+    bound_ways(points, drift, exact.among, scale)
+    bound_ways(points, drift, exact.against, scale)
+    together(exact.wholes, scale)
+    held_back, moves = 0, points.moves
+    for k in range(position.shape[1]):
+        if scale[k] < 1.0 and moves[k]:
+            held_back += 1
+            for i in range(3):
+                position[i, k] = now[k, i] = start[k, i] + drift[i] + scale[k] * (now[k, i] - start[k, i] - drift[i])
+    exact.tally[2] += held_back
+    exact.tally[1] += 1
+    zero = 0.0
+    walk(points, drift[0], drift[1], drift[2], exact.among)
+    walk(points, zero, zero, zero, exact.against)
+
+
+@kernel
+def bound_gaps(points, drift, gaps, scale):
+    """Points of gaps that no fixed plane keeps open may go a part of them at most."""
+    now, start = points.now, points.start
+    for g in range(gaps.listed[0]):
+        gap, two, low, high = gaps.gap[g], gaps.edges[g], np.inf, -np.inf
+        nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
+        far = 0.0
+        base = nx * start[gaps.point[g, 0], 0] + ny * start[gaps.point[g, 0], 1] + nz * start[gaps.point[g, 0], 2]
+        for k in range(4):
+            p = gaps.point[g, k]
+            x, y, z = now[p, 0] - start[p, 0] - drift[0], now[p, 1] - start[p, 1] - drift[1], now[p, 2] - start[p, 2] - drift[2]
+            before = nx * start[p, 0] + ny * start[p, 1] + nz * start[p, 2] - base
+            after = before + nx * x + ny * y + nz * z
+            if k == 0 or (k == 1 and two == 1):
+                low = min(low, before, after)
+            else:
+                high = max(high, before, after)
+            far = max(far, x * x + y * y + z * z)
+        if low - high >= LEAST * gap or far <= HOLD * HOLD * gap * gap:
+            continue
+        for k in range(4):
+            p = gaps.point[g, k]
+            bound_one(now, start, drift, p, HOLD * gap, scale)
+
+
+@inlined
+def bound_one(now, start, drift, p, most, scale):
+    """Point p may get so far at most, relative to the drift."""
+    x, y, z = now[p, 0] - start[p, 0] - drift[0], now[p, 1] - start[p, 1] - drift[1], now[p, 2] - start[p, 2] - drift[2]
+    squared = x * x + y * y + z * z
+    if squared > most * most:
+        scale[p] = min(scale[p], most / math.sqrt(squared))
+
+
+@kernel
+def bound_ways(points, drift, listing, scale):
+    """No point gets farther than gaps were looked for with."""
+    if listing is None:
+        return
+    for p in range(scale.size):
+        bound_one(points.now, points.start, drift, p, listing.step[p], scale)
+
+
+@kernel
+def together(wholes, scale):
+    """A rigid body is held back as a whole."""
+    if wholes is None:
+        return
+    for b in range(wholes.size.size):
+        first, stride, least = wholes.first[b], wholes.stride[b], 1.0
+        last = first + wholes.size[b] * stride
+        for k in range(first, last, stride):
+            least = min(least, scale[k])
+        if least < 1.0:
+            for k in range(first, last, stride):
+                scale[k] = least
+
+
+@kernel
+def walk(points, u, v, w, listing):
+    """Add this substep's steps, relative to (u, v, w), to the ways."""
+    if listing is None:
+        return
+    now, start, path = points.now, points.start, listing.path
+    for p in range(path.size):
+        x, y, z = now[p, 0] - start[p, 0] - u, now[p, 1] - start[p, 1] - v, now[p, 2] - start[p, 2] - w
+        path[p] += math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def deepest_gap(exact):
+    """By how much the features of a gap were nearer than their reach when the last substep began [m], 0 if none was."""
+    if exact is None:
+        return 0.0
+    deepest = 0.0
+    for g in range(exact.gaps.listed[0]):
+        deepest = max(deepest, exact.gaps.reach[g] - exact.gaps.gap[g])
+    return deepest
+
+
+@kernel
+def pushing_gaps(exact):
+    """How many gaps were opened in the last substep."""
+    if exact is None:
+        return 0
+    pushed = 0
+    for g in range(exact.gaps.listed[0]):
+        pushed += exact.gaps.push[g] > 0.0
+    return pushed
