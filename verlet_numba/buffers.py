@@ -585,11 +585,12 @@ class Pieces(NamedTuple):
     piece: Array                # (M,) int 1; of a leaf, -1: an inner node
     leaf: Array                 # (J,) int 1; all leaves
     inner: Array                # (I,) int 1; all inner nodes, the deepest first
-    sphere: Array               # (M, 4) double m; centre, and radius with contact radius and slack
+    box: Array                  # (M, 6) double m; least x, y, z, largest x, y, z, with contact radius and slack
     slack: Array                # (M,) double m; the largest of the points below
     rectangle: Array            # (M, 4) int 1; of nodes of cloth: first and last i, first and last j of its cells
     bound: Array                # (M, 12) double m; of its edges along i and along j: least x, y, z each, then largest
     lattice: Array              # (T, 4) double m; spacing along i, along j, closest features that share no corner, their reach; 0: no cloth
+    node: Array                 # (E,) int 1; the leaf that each piece is
     corner: Array               # (E, 4) int 1; of a cell in its order, of others one of them repeated
     vertices: Array             # (E + 1,) int 1; vertices of piece e: vertices[e] to vertices[e + 1] of `vertex`
     vertex: Array               # (V,) int 1
@@ -667,8 +668,10 @@ class Exact(NamedTuple):
     gaps: Gaps
     wholes: Wholes | None       # None: there is no rigid body
     scale: Array                # (A,) double 1; scratch: which part of its step a point may take
-    drift: Array                # (3,) double m; the step that bounds of steps are relative to
+    drift: Array                # (3,) double m; the step that ways among deformable bodies are relative to
+    frame: Array                # (3,) double m; and that points are held back to
     floor: float                # double m; the least step that is allowed for
+    least: float                # double m; the least reach of two features of deformable bodies
     tally: Array                # (3,) int 1; lists made, substeps, points held back in all
 
 

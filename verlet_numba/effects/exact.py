@@ -47,8 +47,7 @@ def find_exact(position, previous, contact, exact):
     gaps.listed[0] = 0
     if not find_against(exact):
         return False
-    if gaps.listed[0] > 0:                  # what stands still is near: steps are bounded as they are
-        exact.drift[0] = exact.drift[1] = exact.drift[2] = 0.0
+    choose_frame(gaps.listed[0] > 0, exact.drift, exact.frame, exact.least)
     return find_among(exact)
 
 
@@ -87,6 +86,20 @@ def mean_step(points, among, drift):
     for p in soft:
         x, y, z = x + (now[p, 0] - start[p, 0]), y + (now[p, 1] - start[p, 1]), z + (now[p, 2] - start[p, 2])
     drift[0], drift[1], drift[2] = x / soft.size, y / soft.size, z / soft.size
+
+
+@kernel
+def choose_frame(grounded, drift, frame, least):
+    """Points are held back towards the mean step of all, but where rigid bodies or colliders are near towards none.
+
+    Features that are not near each other may then part from that mean by twice its length: if their reach is less, steps
+    are counted without it.
+    """
+    if grounded and 4.0 * (drift[0]**2 + drift[1]**2 + drift[2]**2) > (1.0 - LEAST) * least * least:
+        for i in range(3):
+            drift[i] = 0.0
+    for i in range(3):
+        frame[i] = 0.0 if grounded else drift[i]
 
 
 @kernel
@@ -166,8 +179,16 @@ def part_exact(position, previous, inverse_mass, contact, exact):
             for k in range(x.size):
                 now[k, i] = x[k]
         begin_wholes(exact.wholes)
+        point, weight, normal, reach = gaps.point, gaps.weight, gaps.normal, gaps.reach
         for g in range(gaps.listed[0] - 1, -1, -1):
-            open_gap(position, previous, inverse_mass, points, exact.wholes, gaps, g)
+            a, b, c, d = point[g, 0], point[g, 1], point[g, 2], point[g, 3]
+            p, q, r, s = weight[g, 0], weight[g, 1], weight[g, 2], weight[g, 3]
+            x = p * now[a, 0] + q * now[b, 0] + r * now[c, 0] + s * now[d, 0]
+            y = p * now[a, 1] + q * now[b, 1] + r * now[c, 1] + s * now[d, 1]
+            z = p * now[a, 2] + q * now[b, 2] + r * now[c, 2] + s * now[d, 2]
+            push = reach[g] - (x * normal[g, 0] + y * normal[g, 1] + z * normal[g, 2])
+            if push > 0.0:
+                open_gap(position, previous, inverse_mass, points, exact.wholes, gaps, g, push, x, y, z)
         take_back(position, previous, points)
     separate(position, contact)
 
@@ -181,18 +202,12 @@ def begin_wholes(wholes):
 
 
 @kernel
-def open_gap(position, previous, inverse_mass, points, wholes, gaps, g):
-    """Open a gap to its reach along its normal, and take back sliding within the cone of friction."""
+def open_gap(position, previous, inverse_mass, points, wholes, gaps, g, push, x, y, z):
+    """Open a gap by the push along its normal, and take back sliding within the cone of friction. (x, y, z): across the gap."""
     now, start, free, gap, reach = points.now, points.start, points.free, gaps.gap[g], gaps.reach[g]
     a, b, c, d = gaps.point[g, 0], gaps.point[g, 1], gaps.point[g, 2], gaps.point[g, 3]
     p, q, r, s = gaps.weight[g, 0], gaps.weight[g, 1], gaps.weight[g, 2], gaps.weight[g, 3]
     nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
-    x = p * now[a, 0] + q * now[b, 0] + r * now[c, 0] + s * now[d, 0]
-    y = p * now[a, 1] + q * now[b, 1] + r * now[c, 1] + s * now[d, 1]
-    z = p * now[a, 2] + q * now[b, 2] + r * now[c, 2] + s * now[d, 2]
-    push = reach - (x * nx + y * ny + z * nz)
-    if not push > 0.0:
-        return
     give = p * p * free[a] + q * q * free[b] + r * r * free[c] + s * s * free[d]
     give += give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz)
     if not give > 0.0:
@@ -322,7 +337,7 @@ def limit_exact(position, exact):
     """Hold points back that might pass through something on their way, and note the ways taken. Nothing comes after it."""
     if exact is None:
         return
-    points, drift, scale = exact.points, exact.drift, exact.scale
+    points, drift, frame, scale = exact.points, exact.drift, exact.frame, exact.scale
     now, start = points.now, points.start
     for i in range(3):
         x = position[i]
@@ -330,16 +345,16 @@ def limit_exact(position, exact):
             now[k, i] = x[k]
     for k in range(scale.size):
         scale[k] = 1.0
-    bound_gaps(points, drift, exact.gaps, scale)
-    bound_ways(points, drift, exact.among, scale)
-    bound_ways(points, drift, exact.against, scale)
+    bound_gaps(points, frame, exact.gaps, scale)
+    bound_ways(points, frame, drift, exact.among, scale)
+    bound_ways(points, frame, frame, exact.against, scale)
     together(exact.wholes, scale)
     held_back, moves = 0, points.moves
     for k in range(position.shape[1]):
         if scale[k] < 1.0 and moves[k]:
             held_back += 1
             for i in range(3):
-                position[i, k] = now[k, i] = start[k, i] + drift[i] + scale[k] * (now[k, i] - start[k, i] - drift[i])
+                position[i, k] = now[k, i] = start[k, i] + frame[i] + scale[k] * (now[k, i] - start[k, i] - frame[i])
     exact.tally[2] += held_back
     exact.tally[1] += 1
     zero = 0.0
@@ -348,7 +363,7 @@ def limit_exact(position, exact):
 
 
 @kernel
-def bound_gaps(points, drift, gaps, scale):
+def bound_gaps(points, frame, gaps, scale):
     """Points of gaps that no fixed plane keeps open may go a part of them at most."""
     now, start = points.now, points.start
     for g in range(gaps.listed[0]):
@@ -358,7 +373,7 @@ def bound_gaps(points, drift, gaps, scale):
         base = nx * start[gaps.point[g, 0], 0] + ny * start[gaps.point[g, 0], 1] + nz * start[gaps.point[g, 0], 2]
         for k in range(4):
             p = gaps.point[g, k]
-            x, y, z = now[p, 0] - start[p, 0] - drift[0], now[p, 1] - start[p, 1] - drift[1], now[p, 2] - start[p, 2] - drift[2]
+            x, y, z = now[p, 0] - start[p, 0] - frame[0], now[p, 1] - start[p, 1] - frame[1], now[p, 2] - start[p, 2] - frame[2]
             before = nx * start[p, 0] + ny * start[p, 1] + nz * start[p, 2] - base
             after = before + nx * x + ny * y + nz * z
             if k == 0 or (k == 1 and two == 1):
@@ -370,7 +385,7 @@ def bound_gaps(points, drift, gaps, scale):
             continue
         for k in range(4):
             p = gaps.point[g, k]
-            bound_one(now, start, drift, p, HOLD * gap, scale)
+            bound_one(now, start, frame, p, HOLD * gap, scale)
 
 
 @inlined
@@ -383,12 +398,17 @@ def bound_one(now, start, drift, p, most, scale):
 
 
 @kernel
-def bound_ways(points, drift, listing, scale):
-    """No point gets farther than gaps were looked for with."""
+def bound_ways(points, frame, drift, listing, scale):
+    """No point gets farther from the drift than gaps were looked for with, or else, seen from the frame, than that may be."""
     if listing is None:
         return
+    now, start, step = points.now, points.start, listing.step
+    beside = math.sqrt((drift[0] - frame[0])**2 + (drift[1] - frame[1])**2 + (drift[2] - frame[2])**2)
+    u, v, w = drift[0], drift[1], drift[2]
     for p in range(scale.size):
-        bound_one(points.now, points.start, drift, p, listing.step[p], scale)
+        x, y, z = now[p, 0] - start[p, 0] - u, now[p, 1] - start[p, 1] - v, now[p, 2] - start[p, 2] - w
+        if x * x + y * y + z * z > step[p] * step[p]:
+            bound_one(now, start, frame, p, step[p] + beside, scale)
 
 
 @kernel

@@ -6,7 +6,7 @@ their distance there: else a cloth thicker than its cells would press on itself 
 
 import math
 
-from verlet_numba._jit import inlined, kernel
+from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.buffers import NEARER
 from verlet_numba.physics.closest import of_segments, on_triangle
 
@@ -19,56 +19,96 @@ def list_features(place, points, pieces, listing):
     """
     vertices, vertex, edges, edge, triangles, triangle = (pieces.vertices, pieces.vertex, pieces.edges, pieces.edge,
                                                           pieces.triangles, pieces.triangle)
+    box, node, slack, one, two = pieces.box, pieces.node, listing.slack, listing.pairs.first, listing.pairs.second
+    rest, same, moves, radius, body = points.rest, points.same, points.moves, points.radius, points.body
+    point, kind, reach, left = listing.point, listing.edges, listing.reach, listing.left
     listed = 0
     for n in range(listing.pairs.listed[0]):
-        e, f = listing.pairs.first[n], listing.pairs.second[n]
-        for v in range(vertices[e], vertices[e + 1]):
-            for t in range(triangles[f], triangles[f + 1]):
-                listed = list_one(place, points, listing, vertex[v], triangle[0, t], triangle[1, t], triangle[2, t], 0, listed)
-        for v in range(vertices[f], vertices[f + 1]):
-            for t in range(triangles[e], triangles[e + 1]):
-                listed = list_one(place, points, listing, vertex[v], triangle[0, t], triangle[1, t], triangle[2, t], 0, listed)
-        faces = triangles[e + 1] - triangles[e], triangles[f + 1] - triangles[f]
-        for s in range(edges[e], edges[e + 1]):
-            a, b = edge[0, s], edge[1, s]
-            for t in range(edges[f], edges[f + 1]):
-                c, d = edge[0, t], edge[1, t]
-                if (a == b and faces[1] > 0) or (c == d and faces[0] > 0):
+        for turn in range(2):
+            e, f = (two[n], one[n]) if turn else (one[n], two[n])
+            k, faces = node[f], triangles[f + 1] - triangles[f]
+            for v in range(vertices[e], vertices[e + 1] if faces else vertices[e]):
+                a = vertex[v]
+                if outside(place, a, a, radius[a] + slack[a], box, k):
                     continue
-                listed = list_one(place, points, listing, a, b, c, d, 1, listed)
+                for t in range(triangles[f], triangles[f + 1]):
+                    b, c, d = triangle[0, t], triangle[1, t], triangle[2, t]
+                    far = radius[a] + radius[d] + slack[a] + max(slack[b], slack[c], slack[d])
+                    if not triangle_beyond(place, a, b, c, d, far):
+                        listed = list_one(place, rest, same, moves, radius, body, point, kind, reach, left,
+                                          a, b, c, d, 0, far, listed)
+            if turn:
+                continue
+            single = triangles[e + 1] > triangles[e]
+            for s in range(edges[e], edges[e + 1]):
+                a, b = edge[0, s], edge[1, s]
+                own = max(slack[a], slack[b])
+                if (a == b and faces) or outside(place, a, b, radius[a] + own, box, k):
+                    continue
+                for t in range(edges[f], edges[f + 1]):
+                    c, d = edge[0, t], edge[1, t]
+                    far = radius[a] + radius[d] + own + max(slack[c], slack[d])
+                    if not (c == d and single) and not edges_beyond(place, a, b, c, d, far):
+                        listed = list_one(place, rest, same, moves, radius, body, point, kind, reach, left,
+                                          a, b, c, d, 1, far, listed)
         if listed < 0:
             return False
     listing.made[0] = listed
     return True
 
 
+@inlined
+def outside(place, a, b, reach, box, k):
+    """Whether the line from a to b lies beyond a side of a node's box, by more than its own reach."""
+    return (min(place[a, 0], place[b, 0]) - reach > box[k, 3] or max(place[a, 0], place[b, 0]) + reach < box[k, 0]
+            or min(place[a, 1], place[b, 1]) - reach > box[k, 4] or max(place[a, 1], place[b, 1]) + reach < box[k, 1]
+            or min(place[a, 2], place[b, 2]) - reach > box[k, 5] or max(place[a, 2], place[b, 2]) + reach < box[k, 2])
+
+
+@inlined
+def triangle_beyond(place, a, b, c, d, far):
+    """Whether vertex a and triangle b, c, d are at least so far apart along x, y or z."""
+    return (place[a, 0] - max(place[b, 0], place[c, 0], place[d, 0]) >= far
+            or min(place[b, 0], place[c, 0], place[d, 0]) - place[a, 0] >= far
+            or place[a, 1] - max(place[b, 1], place[c, 1], place[d, 1]) >= far
+            or min(place[b, 1], place[c, 1], place[d, 1]) - place[a, 1] >= far
+            or place[a, 2] - max(place[b, 2], place[c, 2], place[d, 2]) >= far
+            or min(place[b, 2], place[c, 2], place[d, 2]) - place[a, 2] >= far)
+
+
+@inlined
+def edges_beyond(place, a, b, c, d, far):
+    """Whether edges a, b and c, d are at least so far apart along x, y or z."""
+    return (min(place[a, 0], place[b, 0]) - max(place[c, 0], place[d, 0]) >= far
+            or min(place[c, 0], place[d, 0]) - max(place[a, 0], place[b, 0]) >= far
+            or min(place[a, 1], place[b, 1]) - max(place[c, 1], place[d, 1]) >= far
+            or min(place[c, 1], place[d, 1]) - max(place[a, 1], place[b, 1]) >= far
+            or min(place[a, 2], place[b, 2]) - max(place[c, 2], place[d, 2]) >= far
+            or min(place[c, 2], place[d, 2]) - max(place[a, 2], place[b, 2]) >= far)
+
+
 @kernel
-def list_one(place, points, listing, a, b, c, d, edges, listed):
-    """List one pair if it is near; the new number of pairs, -1: there is no room, or was none."""
-    slack, same, moves = listing.slack, points.same, points.moves
-    if listed < 0 or not (moves[a] | moves[b] | moves[c] | moves[d]):
+def list_one(place, rest, same, moves, radius, body, point, kind, reach, left, a, b, c, d, edges, far, listed):
+    """List one pair if it is nearer than `far`; the new number of pairs, -1: there is no room, or was none."""
+    if listed < 0 or not moves[a] | moves[b] | moves[c] | moves[d] or shared(same[a], same[b], same[c], same[d], edges):
         return listed
-    i, j, k, l = same[a], same[b], same[c], same[d]
-    if i == k or i == l or (edges == 0 and i == j) or (edges == 1 and (j == k or j == l)):
+    distance, whole = distance_of(place, a, b, c, d, edges), radius[a] + radius[d]
+    nearest = whole
+    if distance < far and body[a] >= 0 and body[a] == body[d]:
+        nearest = min(whole, NEARER * distance_of(rest, a, b, c, d, edges))
+    if distance >= far - whole + nearest:
         return listed
-    reach = points.radius[a] + points.radius[d]
-    far = reach + of_pair(slack, a, b, c, d, edges)
-    if aside(place, a, b, c, d, edges, 0, far) or aside(place, a, b, c, d, edges, 1, far) or aside(
-            place, a, b, c, d, edges, 2, far):
-        return listed
-    distance = distance_of(place, a, b, c, d, edges)
-    if distance >= far:
-        return listed
-    if points.body[a] >= 0 and points.body[a] == points.body[d]:
-        reach = min(reach, NEARER * distance_of(points.rest, a, b, c, d, edges))
-        if distance >= reach + of_pair(slack, a, b, c, d, edges):
-            return listed
-    if listed == listing.left.size:
+    if listed == left.size:
         return -1
-    point = listing.point
     point[listed, 0], point[listed, 1], point[listed, 2], point[listed, 3] = a, b, c, d
-    listing.edges[listed], listing.reach[listed], listing.left[listed] = edges, reach, distance - reach
+    kind[listed], reach[listed], left[listed] = edges, nearest, distance - nearest
     return listed + 1
+
+
+@formula
+def shared(i, j, k, l, edges):
+    """Whether two features share a corner."""
+    return i == k or i == l or (edges == 0 and i == j) or (edges == 1 and (j == k or j == l))
 
 
 @inlined
@@ -77,18 +117,6 @@ def of_pair(values, a, b, c, d, edges):
     one, two, three, four = values[a], values[b], values[c], values[d]
     other = max(three, four)
     return max(one, two) + other if edges else one + max(two, other)
-
-
-@inlined
-def aside(place, a, b, c, d, edges, axis, far):
-    """Whether two features are at least so far apart along an axis."""
-    one, two, three, four = place[a, axis], place[b, axis], place[c, axis], place[d, axis]
-    low, high, least, most = one, one, min(three, four), max(three, four)
-    if edges:
-        low, high = min(one, two), max(one, two)
-    else:
-        least, most = min(least, two), max(most, two)
-    return least - high >= far or low - most >= far
 
 
 @kernel

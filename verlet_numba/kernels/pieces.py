@@ -1,54 +1,38 @@
 """Trees over pieces of surface: cells of cloth, segments, triangles of hulls. Pairs of pieces that come near each other.
 
-As with the trees of particles (kernels/sphere_tree.py) spheres are updated from the leaves up, and parts of a cloth are
-passed over whose edges prove that no two of their features can be near. Here every node down to a single cell has such
-bounds. Any two points of a cloth's surface are joined by a path across its triangles, each of which is spanned by one edge
-along i and one along j of its cell: so what physics/flatness.py says of particles holds for all points of the surface, with
-the closest features that share no corner in place of the closest particles.
+As with the trees of particles (kernels/sphere_tree.py) bounds are updated from the leaves up, and parts of a cloth are passed
+over whose edges prove that no two of their features can be near. Here every node down to a single cell has such bounds. Any
+two points of a cloth's surface are joined by a path across its triangles, each of which is spanned by one edge along i and
+one along j of its cell: so what physics/flatness.py says of particles holds for all points of the surface, with the closest
+features that share no corner in place of the closest particles. Nodes are boxes, not spheres: a sphere about the face of a
+crate holds all of the cloth that lies on it.
 
-The descent goes by the number of leaves, not by the size of spheres: pairs are listed in an order that does not depend on
+The descent goes by the number of leaves, not by the size of boxes: pairs are listed in an order that does not depend on
 where anything is, so that results do not depend on when a list was made.
 """
 
-import math
-
-import numpy as np
-
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.kernels.sphere_tree import ROUNDING, SLACK, overlap
-from verlet_numba.physics.enclosing import sphere_of_spheres
+from verlet_numba.kernels.sphere_tree import SLACK
 from verlet_numba.physics.flatness import unfolded
 
 
 @kernel
 def update_pieces(place, radius, slack, pieces):
-    """Spheres, slack and bounds of all nodes. place (A, 3) m; radius and slack (A,) m."""
-    corner, piece, skip, sphere, most = pieces.corner, pieces.piece, pieces.skip, pieces.sphere, pieces.slack
+    """Boxes and slack of all nodes. place (A, 3) m; radius and slack (A,) m, by which a box reaches beyond its corners."""
+    corner, piece, skip, box, most = pieces.corner, pieces.piece, pieces.skip, pieces.box, pieces.slack
     for k in pieces.leaf:
         e = piece[k]
         a, b, c, d = corner[e, 0], corner[e, 1], corner[e, 2], corner[e, 3]
-        x = 0.25 * (place[a, 0] + place[b, 0] + place[c, 0] + place[d, 0])
-        y = 0.25 * (place[a, 1] + place[b, 1] + place[c, 1] + place[d, 1])
-        z = 0.25 * (place[a, 2] + place[b, 2] + place[c, 2] + place[d, 2])
-        r = max(beyond(place, radius, slack, a, x, y, z), beyond(place, radius, slack, b, x, y, z),
-                beyond(place, radius, slack, c, x, y, z), beyond(place, radius, slack, d, x, y, z))
-        r += ROUNDING * (r + abs(x) + abs(y) + abs(z))
-        sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3] = x, y, z, r
         most[k] = max(slack[a], slack[b], slack[c], slack[d])
+        beyond = most[k] + max(radius[a], radius[b], radius[c], radius[d])
+        for i in range(3):
+            p, q, r, s = place[a, i], place[b, i], place[c, i], place[d, i]
+            box[k, i], box[k, 3 + i] = min(p, q, r, s) - beyond, max(p, q, r, s) + beyond
     for k in pieces.inner:
         a, b = k + 1, skip[k + 1]
-        x, y, z, r = sphere_of_spheres(sphere[a, 0], sphere[a, 1], sphere[a, 2], sphere[a, 3],
-                                       sphere[b, 0], sphere[b, 1], sphere[b, 2], sphere[b, 3])
-        r += ROUNDING * (r + abs(x) + abs(y) + abs(z))
-        sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3] = x, y, z, r
         most[k] = max(most[a], most[b])
-
-
-@inlined
-def beyond(place, radius, slack, p, x, y, z):
-    """How far from (x, y, z) point p reaches, its radius and slack included."""
-    dx, dy, dz = place[p, 0] - x, place[p, 1] - y, place[p, 2] - z
-    return math.sqrt(dx * dx + dy * dy + dz * dz) + radius[p] + slack[p]
+        for i in range(3):
+            box[k, i], box[k, 3 + i] = min(box[a, i], box[b, i]), max(box[a, 3 + i], box[b, 3 + i])
 
 
 @kernel
@@ -78,16 +62,12 @@ def update_edges(place, pieces):
 @kernel
 def list_among(pieces, itself, stack, pairs):
     """List pairs of pieces of deformable bodies that are near, of each with itself if it is not None. False: no room."""
-    root, sphere, soft = pieces.root, pieces.sphere, pieces.soft
-    listed = 0
+    listed, soft = 0, pieces.soft
     for t in range(soft):
         for u in range(own(t, itself), soft):
-            k, l = root[t], root[u]
-            if k == l or overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
-                                 sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], 0.0):
-                listed = descend_pieces(t, u, pieces, stack, pairs, listed)
-                if listed < 0:
-                    return False
+            listed = descend_pieces(t, u, pieces, stack, pairs, listed)
+            if listed < 0:
+                return False
     pairs.listed[0] = listed
     return True
 
@@ -116,7 +96,7 @@ def list_against_others(pieces, stack, pairs):
 @kernel
 def descend_pieces(t, u, pieces, stack, pairs, listed):
     """List the pairs of pieces of two trees, or of one with itself; the new number of pairs, -1: no room."""
-    skip, piece, sphere, slack, rectangle = pieces.skip, pieces.piece, pieces.sphere, pieces.slack, pieces.rectangle
+    skip, piece, box, slack, rectangle = pieces.skip, pieces.piece, pieces.box, pieces.slack, pieces.rectangle
     bound, lattice, first, second = pieces.bound, pieces.lattice, stack.first, stack.second
     one, two = pairs.first, pairs.second
     a, b, closest, reach = lattice[t, 0], lattice[t, 1], lattice[t, 2], lattice[t, 3]
@@ -136,8 +116,7 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
             first[height + 2], second[height + 2] = c, d
             height += 3
             continue
-        if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
-                       sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], 0.0):
+        if apart(box, k, l):
             continue
         if flat and side_by_side(rectangle, k, l) and unfolded(
                 min(bound[k, 0], bound[l, 0]), min(bound[k, 1], bound[l, 1]), min(bound[k, 2], bound[l, 2]),
@@ -160,6 +139,13 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
             first[height + 1], second[height + 1] = k, l + 1
             height += 2
     return listed
+
+
+@inlined
+def apart(box, k, l):
+    """Whether the boxes of two nodes have nothing in common."""
+    return (box[k, 0] > box[l, 3] or box[l, 0] > box[k, 3] or box[k, 1] > box[l, 4] or box[l, 1] > box[k, 4]
+            or box[k, 2] > box[l, 5] or box[l, 2] > box[k, 5])
 
 
 @inlined

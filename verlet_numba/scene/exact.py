@@ -2,26 +2,26 @@
 
 import numpy as np
 
-from verlet_numba.buffers import SPHERE, Contacts, Exact, Friction, Gaps, Listing, Points, Wholes, gate
+from verlet_numba.buffers import NEARER, SPHERE, Contacts, Exact, Friction, Gaps, Listing, Points, Wholes, gate
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid
 from verlet_numba.scene.numbering import Numbering, spread
 from verlet_numba.scene.pieces import Placed, at_rest, body_surfaces, of_solid, pieces_of
 from verlet_numba.scene.rigid import rigid_bodies
-from verlet_numba.scene.sphere_trees import candidates_of, stack_of
+from verlet_numba.scene.sphere_trees import candidates_of, spacing, stack_of
 
 LEAST_RADIUS = 1e-3     # of the deformable bodies' spacing: what has no thickness is still met from a distance
 FLOOR = 0.02            # of it: the step that is allowed for even where nothing moves
 
 
 def exact_of(bodies: list[Body], numbering: Numbering, found: list[Solid], contact: Contacts | None, together: Integers,
-             inverse_mass: Floats, belongs: Integers, friction: Friction | None, itself: bool, spacing: float) -> Exact | None:
+             inverse_mass: Floats, belongs: Integers, friction: Friction | None, itself: bool, side: float) -> Exact | None:
     """Exact contact of a scene's deformable bodies; None if they meet nothing.
 
     together (A, 2): particles that are attached; belongs (n,): rigid body or -1; itself: whether bodies meet themselves;
-    spacing: the shortest stick of deformable bodies, m.
+    side: the shortest stick of deformable bodies, m.
     """
-    least, size = LEAST_RADIUS * spacing, len(inverse_mass)
+    least, size = LEAST_RADIUS * side, len(inverse_mass)
     soft = list(body_surfaces(bodies, numbering, False, least))
     others = list(body_surfaces(bodies, numbering, True, least))
     corners, solids, radii = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
@@ -41,7 +41,22 @@ def exact_of(bodies: list[Body], numbering: Numbering, found: list[Solid], conta
     count = len(points.free)
     return Exact(pieces, points, 1 if itself else None, listing_of(pieces, count) if several else None,
                  listing_of(pieces, count) if others else None, gaps_of(FIRST_ROOM), wholes_of(bodies, numbering),
-                 gate(np.ones(count), np.float64), gate(np.zeros(3), np.float64), FLOOR * spacing, gate(np.zeros(3), np.int64))
+                 gate(np.ones(count), np.float64), gate(np.zeros(3), np.float64), gate(np.zeros(3), np.float64), FLOOR * side,
+                 least_reach(bodies, least), gate(np.zeros(3), np.int64))
+
+
+def least_reach(bodies: list[Body], least: float) -> float:
+    """How near features of deformable bodies may come, at the least, m: by their radii, or by their distance at rest."""
+    found = [np.inf]
+    for body in bodies:
+        shape = body.shape
+        if not shape.rigid:
+            found.append(2 * max(shape.radius, least))
+            if shape.layout[0] == "grid":
+                found.append(NEARER * float(np.prod(spacing(shape))) / float(np.hypot(*spacing(shape))))
+            elif shape.segments:
+                found.append(NEARER * float(shape.lengths.min(initial=np.inf)) if shape.layout[0] == "line" else 0.0)
+    return min(found)
 
 
 def points_of(bodies: list[Body], numbering: Numbering, found: list[Solid], solid: Integers, local: Floats, rounding: Floats,

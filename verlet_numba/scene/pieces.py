@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verlet_numba.buffers import BOX, CYLINDER, NEARER, SPHERE, Pieces, gate
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
@@ -35,13 +36,31 @@ class Placed(NamedTuple):
 
 
 NONE = (0.0, 0.0, 0.0, 0.0)
+FLAT = 1e-9             # rad, about: triangles with less between them are one face
 
 
 def of_triangles(positions: Floats, triangles: Integers) -> Surface:
-    """Every triangle is a piece."""
+    """Every triangle is a piece. Edges within a flat face belong to none: what passes them passes the face or its border."""
     own = np.arange(len(triangles))
     tree = halved(positions[triangles].mean(axis=1))
-    return owning(tree, NONE, np.concatenate([triangles, triangles[:, :1]], axis=1), own, triangles)
+    found = owning(tree, NONE, np.concatenate([triangles, triangles[:, :1]], axis=1), own, triangles)
+    owner, edge = found.edge
+    sharp = ~within_face(positions, triangles, edge)
+    return found._replace(edge=(owner[sharp], edge[sharp]))
+
+
+def within_face(positions: Floats, triangles: Integers, edge: Integers) -> NDArray[np.bool_]:
+    """(S,) whether both triangles of an edge (S, 2), its ends in ascending order, lie in one plane."""
+    p, q, r = np.moveaxis(positions[triangles], 1, 0)
+    normal = np.cross(q - p, r - p)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    count = len(positions)
+    keys, wanted = sides @ [count, 1], edge @ [count, 1]
+    order = np.argsort(keys, kind="stable")
+    low, high = (np.searchsorted(keys[order], wanted, side) for side in ("left", "right"))
+    one, other = normal[order[low] // 3], normal[order[high - 1] // 3]
+    return np.asarray((high - low == 2) & (np.linalg.norm(one - other, axis=1) < FLAT))
 
 
 def of_cloth(shape: Shape, radius: float) -> Surface:
@@ -138,8 +157,9 @@ def pieces_of(soft: list[Placed], others: list[Placed]) -> Pieces:
     lattice = [placed.surface.lattice for placed in (*soft, *others) for _ in placed.points]
     return Pieces(trees, gate(nodes, np.int64), gate(skip, np.int64), gate(piece, np.int64),
                   gate(np.flatnonzero(piece >= 0), np.int64), gate(inner[np.argsort(-level[inner], kind="stable")], np.int64),
-                  gate(np.zeros((len(skip), 4)), np.float64), gate(np.zeros(len(skip)), np.float64), gate(rectangle, np.int64),
-                  gate(np.zeros((len(skip), 12)), np.float64), gate(lattice, np.float64), gate(corner, np.int64),
+                  gate(np.zeros((len(skip), 6)), np.float64), gate(np.zeros(len(skip)), np.float64), gate(rectangle, np.int64),
+                  gate(np.zeros((len(skip), 12)), np.float64), gate(lattice, np.float64), gate(np.argsort(piece)[-count:], np.int64),
+                  gate(corner, np.int64),
                   *(gate(part, np.int64) for both in owned for part in both))
 
 
