@@ -19,7 +19,7 @@ Array = NDArray[Any]
 
 PLANE, BOX, SPHERE, CYLINDER, MESH = 0, 1, 2, 3, 4      # Solids.kind
 FRAME, SUBSTEP, NUMBER, STAGE = 0, 1, 2, 3              # World.clock
-WHOLE, INTEGRATED = 0, 1                                # its stage: where a substep begins, or is taken up again
+WHOLE, INTEGRATED, ARRESTED = 0, 1, 2                   # its stage: where a substep begins, or is taken up again
 KINETIC, POTENTIAL, TOTAL, MOMENTUM, ANGULAR, CENTRE = 0, 1, 2, 3, 6, 9         # Frames.measures
 ERROR_MAX, ERROR_RMS, PENETRATION, CONTACTS, RELAXATIONS, FALLBACKS, RESTING, SPEED_MAX = 12, 13, 14, 15, 16, 17, 18, 19
 COLUMNS = 20
@@ -589,7 +589,7 @@ class Pieces(NamedTuple):
     slack: Array                # (M,) double m; the largest of the points below
     rectangle: Array            # (M, 4) int 1; of nodes of cloth: first and last i, first and last j of its cells
     bound: Array                # (M, 12) double m; of its edges along i and along j: least x, y, z each, then largest
-    lattice: Array              # (T, 4) double m; spacing along i, along j, closest features that share no corner, their reach; 0: no cloth
+    lattice: Array              # (T, 4) double m; spacings, distance and reach of the closest features apart; 0: no cloth
     node: Array                 # (E,) int 1; the leaf that each piece is
     corner: Array               # (E, 4) int 1; of a cell in its order, of others one of them repeated
     vertices: Array             # (E + 1,) int 1; vertices of piece e: vertices[e] to vertices[e + 1] of `vertex`
@@ -663,6 +663,7 @@ class Exact(NamedTuple):
     pieces: Pieces
     points: Points
     itself: int | None          # int 1; None: no body meets itself
+    continuous: int | None      # int 1; None: gaps are those at the start of the substep
     among: Listing | None       # of deformable bodies; None: there is one, which does not meet itself
     against: Listing | None     # with rigid bodies and colliders; None: there are none
     gaps: Gaps
@@ -699,6 +700,7 @@ class Effects(NamedTuple):
     restitution: Restitution | None
     rest: Rest | None
     exact: Exact | None
+    rapid: Exact | None         # of rigid bodies that go far in a substep (effects/continuous.py)
     orientation: Orientation | None
 
 

@@ -6,9 +6,10 @@ the loop.
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import ARRESTED, FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.contact import penetration, separate, touching
+from verlet_numba.effects.continuous import arrest
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.exact import deepest_gap, find_exact, limit_exact, part_exact, pushing_gaps
@@ -69,7 +70,7 @@ def advance(world, frames, budget):
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features = effects[6:17]
-    friction, restitution, rest, exact, orientation = effects[17:]
+    friction, restitution, rest, exact, rapid, orientation = effects[17:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -102,11 +103,15 @@ def advance(world, frames, budget):
                 carry(position, end, carried)
                 move(contact, end, moving)
                 hold(position, previous, inverse_mass, rest)
-                move_hulls(hulls, contact, moving)
                 lap(stopwatch, PATHS)
+                clock[STAGE] = INTEGRATED
+            if clock[STAGE] == INTEGRATED:
+                if not arrest(position, previous, inverse_mass, contact, rapid):
+                    return FULL
+                move_hulls(hulls, contact, moving)
                 gather(position, hulls)
                 gather(position, points)
-                clock[STAGE] = INTEGRATED
+                clock[STAGE] = ARRESTED
             while True:                                                     # once, and again where resting bodies wake
                 if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
                         and find_meetings(hulls, meet, rest)
@@ -191,7 +196,8 @@ def advance(world, frames, budget):
         frames.measures[f, PENETRATION] = max(
             penetration(snapshot.position, inverse_mass, contact),
             deepest_in_meshes(snapshot.position, inverse_mass, contact, meshes), depth_of_hulls(snapshot.position, meet, hulls),
-            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest), deepest_gap(exact))
+            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest),
+            deepest_gap(exact))
         frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, h)

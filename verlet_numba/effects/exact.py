@@ -7,6 +7,9 @@ along that vector is moved apart, each point by its weight and inverse mass, rig
 kept. Contact has the last word, and what the substep itself has brought nearer is also what friction acts on; overlap that
 stood already is shifted without becoming speed.
 
+With `continuous_collision` gaps whose points go far are those at the time of impact (kernels/impact_time.py), and what only
+passes by is let pass.
+
 **Nothing passes through.** A gap is safe if one fixed plane keeps its two features apart at the start and at the end of
 their straight ways: then it does so on the way, and whatever part of its step each point takes. Points of any other gap may
 go HOLD of the gap at most, so that what is left of it is more than nothing. And no point gets farther than the step that
@@ -23,6 +26,7 @@ from verlet_numba._jit import inlined, kernel
 from verlet_numba.effects.contact import separate
 from verlet_numba.effects.friction import coefficients
 from verlet_numba.effects.touch import weigh_one
+from verlet_numba.kernels.impact_time import NEVER, time_of_impact
 from verlet_numba.kernels.near_features import find_gaps, list_features
 from verlet_numba.kernels.pieces import list_against_others, list_among, update_edges, update_pieces
 from verlet_numba.physics.friction import held
@@ -30,9 +34,10 @@ from verlet_numba.physics.rigid import cross, times_symmetric
 
 GROWTH = 1.25           # times the step that a point is about to take: how far it may get, with the floor added
 LASTING = 4.0           # steps that a list shall last
-SLACK = 4.0             # times the floor: the least slack of a point
+SLACK = 2.0             # times the floor: and what it may need beside
 HOLD = 0.45             # of a gap: how far its points may go if no plane keeps them apart; below one half
 LEAST = 0.1             # of a gap: what a plane has to leave of it
+CLOSE = 1.0 - 1e-9      # of a step: held back by less than the rest, it is not held back
 
 
 @kernel
@@ -45,10 +50,10 @@ def find_exact(position, previous, contact, exact):
     bring_corners(contact, points)
     mean_step(points, exact.among, exact.drift)
     gaps.listed[0] = 0
-    if not find_against(exact):
+    if not find_against(exact, exact.against):
         return False
     choose_frame(gaps.listed[0] > 0, exact.drift, exact.frame, exact.least)
-    return find_among(exact)
+    return find_among(exact, exact.among)
 
 
 @kernel
@@ -66,7 +71,8 @@ def bring_corners(contact, points):
     """The corners of colliders, at the start and at the end of the substep."""
     if contact is None:
         return
-    solids, start, now, local, first = contact.solids, points.start, points.now, points.local, points.now.shape[0] - points.solid.size
+    solids, start, now, local = contact.solids, points.start, points.now, points.local
+    first = now.shape[0] - points.solid.size
     for c in range(points.solid.size):
         s = points.solid[c]
         for i in range(3):
@@ -103,9 +109,8 @@ def choose_frame(grounded, drift, frame, least):
 
 
 @kernel
-def find_against(exact):
+def find_against(exact, listing):
     """Gaps of deformable bodies with rigid ones and colliders. False: no room."""
-    listing = exact.against
     if listing is None:
         return True
     points, drift = exact.points, exact.drift
@@ -116,13 +121,12 @@ def find_against(exact):
         if not (list_against_others(exact.pieces, listing.stack, listing.pairs)
                 and list_features(points.start, points, exact.pieces, listing)):
             return False
-    return find_gaps(points, listing, exact.gaps)
+    return find_gaps(points, listing, exact.gaps, exact.continuous)
 
 
 @kernel
-def find_among(exact):
+def find_among(exact, listing):
     """Gaps between deformable bodies. False: no room."""
-    listing = exact.among
     if listing is None:
         return True
     points = exact.points
@@ -134,7 +138,7 @@ def find_among(exact):
         if not (list_among(exact.pieces, exact.itself, listing.stack, listing.pairs)
                 and list_features(points.start, points, exact.pieces, listing)):
             return False
-    return find_gaps(points, listing, exact.gaps)
+    return find_gaps(points, listing, exact.gaps, exact.continuous)
 
 
 @kernel
@@ -162,7 +166,7 @@ def renew(points, pieces, floor, listing):
     path, step, slack = listing.path, listing.step, listing.slack
     listing.made[0] = -1
     for p in range(path.size):
-        path[p], slack[p] = 0.0, max(SLACK * floor, LASTING * step[p])
+        path[p], slack[p] = 0.0, LASTING * (step[p] - floor) + SLACK * floor
     update_pieces(points.start, points.radius, slack, pieces)
 
 
@@ -229,7 +233,7 @@ def open_gap(position, previous, inverse_mass, points, wholes, gaps, g, push, x,
     shove_point(now, points.shift, b, q * free[b], fx, fy, fz, tx, ty, tz)
     shove_point(now, points.shift, c, r * free[c], fx, fy, fz, tx, ty, tz)
     shove_point(now, points.shift, d, s * free[d], fx, fy, fz, tx, ty, tz)
-    shove_whole(points, wholes, gaps, g, fx, fy, fz, tx, ty, tz)
+    shove_whole(position, points, wholes, gaps, g, fx, fy, fz, tx, ty, tz)
 
 
 @inlined
@@ -259,66 +263,65 @@ def grip(friction, a, d, sx, sy, sz, nx, ny, nz, push):
 
 @kernel
 def give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz):
-    """How a rigid body gives way to a unit impulse along the normal at its side of the gap: 1/M + (r x n) . I^-1 (r x n)."""
+    """How rigid bodies give way to a unit impulse along the normal of a gap: 1/M + (r x n) . I^-1 (r x n), of both sides."""
     if wholes is None:
         return 0.0
-    e, side, x, y, z = whole_side(points, gaps, g)
-    if e < 0:
-        return 0.0
-    if wholes.stamp[e] == 0:
-        wholes.stamp[e] = 1
-        begin, by = wholes.first[e], wholes.stride[e]
-        weighed = weigh_one(position[0], position[1], position[2], previous[0], previous[1], previous[2], inverse_mass, begin,
-                            begin + wholes.size[e] * by, by)
-        for column in range(10):
-            wholes.mass[e, column] = weighed[column]
-    m = wholes.mass
-    tx, ty, tz = cross(x - m[e, 1], y - m[e, 2], z - m[e, 3], nx, ny, nz)
-    ox, oy, oz = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], tx, ty, tz)
-    return m[e, 0] + tx * ox + ty * oy + tz * oz
+    give, m = 0.0, wholes.mass
+    for side in range(2):
+        e, x, y, z = whole_side(points, gaps, g, side)
+        if e < 0:
+            continue
+        if wholes.stamp[e] == 0:
+            wholes.stamp[e] = 1
+            begin, by = wholes.first[e], wholes.stride[e]
+            weighed = weigh_one(position[0], position[1], position[2], previous[0], previous[1], previous[2], inverse_mass,
+                                begin, begin + wholes.size[e] * by, by)
+            for column in range(10):
+                m[e, column] = weighed[column]
+        tx, ty, tz = cross(x - m[e, 1], y - m[e, 2], z - m[e, 3], nx, ny, nz)
+        ox, oy, oz = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], tx, ty, tz)
+        give += m[e, 0] + tx * ox + ty * oy + tz * oz
+    return give
 
 
 @kernel
-def whole_side(points, gaps, g):
-    """The rigid body of a gap, -1 if it has none, the sign of its side, and its closest point."""
-    for k in range(4):
-        e = points.whole[gaps.point[g, k]]
+def whole_side(points, gaps, g, side):
+    """The rigid body of the first (side 0) or the second feature of a gap, -1 if it has none, and its closest point."""
+    ends = 1 + gaps.edges[g]
+    low, high = (0, ends) if side == 0 else (ends, 4)
+    e, sign, x, y, z = points.whole[gaps.point[g, low]], 1.0 - 2.0 * side, 0.0, 0.0, 0.0
+    for k in range(low, high):
+        p, w = gaps.point[g, k], sign * gaps.weight[g, k]
+        x, y, z = x + w * points.now[p, 0], y + w * points.now[p, 1], z + w * points.now[p, 2]
+    return e, x, y, z
+
+
+@kernel
+def shove_whole(position, points, wholes, gaps, g, fx, fy, fz, tx, ty, tz):
+    """Move the rigid bodies of a gap by the twist that the impulse f gives the first; of it the part t makes no speed."""
+    if wholes is None:
+        return
+    for side in range(2):
+        e, x, y, z = whole_side(points, gaps, g, side)
         if e >= 0:
-            sign = 1.0 if k == 0 or (k == 1 and gaps.edges[g] == 1) else -1.0
-            x = y = z = 0.0
-            for l in range(4):
-                if points.whole[gaps.point[g, l]] >= 0:
-                    p, w = gaps.point[g, l], sign * gaps.weight[g, l]
-                    x, y, z = x + w * points.now[p, 0], y + w * points.now[p, 1], z + w * points.now[p, 2]
-            return e, sign, x, y, z
-    return -1, 0.0, 0.0, 0.0, 0.0
+            sign = 1.0 - 2.0 * side
+            twist(points.now, position, wholes, e, x, y, z, sign * fx, sign * fy, sign * fz)
+            twist(points.shift, position, wholes, e, x, y, z, sign * tx, sign * ty, sign * tz)
 
 
 @kernel
-def shove_whole(points, wholes, gaps, g, fx, fy, fz, tx, ty, tz):
-    """Move the rigid body of a gap by the twist that the impulse f gives it; of it the part t makes no speed."""
-    if wholes is None:
-        return
-    e, sign, x, y, z = whole_side(points, gaps, g)
-    if e < 0:
-        return
-    m, now, shift = wholes.mass, points.now, points.shift
-    cx, cy, cz, by = m[e, 1], m[e, 2], m[e, 3], m[e, 0] * sign
-    ax, ay, az = cross(x - cx, y - cy, z - cz, sign * fx, sign * fy, sign * fz)
+def twist(moved, place, wholes, e, x, y, z, fx, fy, fz):
+    """Move all particles of a rigid body by the impulse f at the point (x, y, z). place (3, n) m: where they were weighed."""
+    m = wholes.mass
+    ax, ay, az = cross(x - m[e, 1], y - m[e, 2], z - m[e, 3], fx, fy, fz)
     ax, ay, az = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], ax, ay, az)
-    qx, qy, qz = cross(x - cx, y - cy, z - cz, sign * tx, sign * ty, sign * tz)
-    qx, qy, qz = times_symmetric(m[e, 4], m[e, 5], m[e, 6], m[e, 7], m[e, 8], m[e, 9], qx, qy, qz)
     first, stride = wholes.first[e], wholes.stride[e]
     for k in range(first, first + wholes.size[e] * stride, stride):
-        dx, dy, dz = now[k, 0] - cx, now[k, 1] - cy, now[k, 2] - cz
+        dx, dy, dz = place[0, k] - m[e, 1], place[1, k] - m[e, 2], place[2, k] - m[e, 3]
         ux, uy, uz = cross(ax, ay, az, dx, dy, dz)
-        vx, vy, vz = cross(qx, qy, qz, dx, dy, dz)
-        now[k, 0] += by * fx + ux
-        now[k, 1] += by * fy + uy
-        now[k, 2] += by * fz + uz
-        shift[k, 0] += by * tx + vx
-        shift[k, 1] += by * ty + vy
-        shift[k, 2] += by * tz + vz
+        moved[k, 0] += m[e, 0] * fx + ux
+        moved[k, 1] += m[e, 0] * fy + uy
+        moved[k, 2] += m[e, 0] * fz + uz
 
 
 @kernel
@@ -337,85 +340,106 @@ def limit_exact(position, exact):
     """Hold points back that might pass through something on their way, and note the ways taken. Nothing comes after it."""
     if exact is None:
         return
-    points, drift, frame, scale = exact.points, exact.drift, exact.frame, exact.scale
-    now, start = points.now, points.start
+    points, frame, scale = exact.points, exact.frame, exact.scale
+    now = points.now
     for i in range(3):
         x = position[i]
         for k in range(x.size):
             now[k, i] = x[k]
     for k in range(scale.size):
         scale[k] = 1.0
-    bound_gaps(points, frame, exact.gaps, scale)
-    bound_ways(points, frame, drift, exact.among, scale)
-    bound_ways(points, frame, frame, exact.against, scale)
-    together(exact.wholes, scale)
-    held_back, moves = 0, points.moves
+    changed = bound_ways(points, frame, exact.drift, exact.among, scale) + bound_ways(points, frame, frame, exact.against, scale)
+    hold_back(position, points, frame, exact.wholes, scale, changed)
+    changed = 1
+    while changed > 0:                      # what was taken to pass by may hit what is held back
+        changed = bound_gaps(points, frame, exact.gaps, scale, exact.continuous)
+        hold_back(position, points, frame, exact.wholes, scale, changed)
+    held_back = 0
     for k in range(position.shape[1]):
-        if scale[k] < 1.0 and moves[k]:
+        if scale[k] < 1.0:
             held_back += 1
             for i in range(3):
-                position[i, k] = now[k, i] = start[k, i] + frame[i] + scale[k] * (now[k, i] - start[k, i] - frame[i])
+                position[i, k] = now[k, i]
     exact.tally[2] += held_back
     exact.tally[1] += 1
-    zero = 0.0
+    drift, zero = exact.drift, 0.0
     walk(points, drift[0], drift[1], drift[2], exact.among)
     walk(points, zero, zero, zero, exact.against)
 
 
 @kernel
-def bound_gaps(points, frame, gaps, scale):
-    """Points of gaps that no fixed plane keeps open may go a part of them at most."""
-    now, start = points.now, points.start
+def bound_gaps(points, frame, gaps, scale, continuous):
+    """Points of gaps that nothing keeps open may go a part of them at most. How many are held back more than before."""
+    now, start, moves, changed = points.now, points.start, points.moves, 0
     for g in range(gaps.listed[0]):
-        gap, two, low, high = gaps.gap[g], gaps.edges[g], np.inf, -np.inf
+        gap, two, low, high, far = gaps.gap[g], gaps.edges[g], np.inf, -np.inf, 0.0
         nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
-        far = 0.0
-        base = nx * start[gaps.point[g, 0], 0] + ny * start[gaps.point[g, 0], 1] + nz * start[gaps.point[g, 0], 2]
+        lead = gaps.point[g, 0]
         for k in range(4):
             p = gaps.point[g, k]
             x, y, z = now[p, 0] - start[p, 0] - frame[0], now[p, 1] - start[p, 1] - frame[1], now[p, 2] - start[p, 2] - frame[2]
-            before = nx * start[p, 0] + ny * start[p, 1] + nz * start[p, 2] - base
+            before = (nx * (start[p, 0] - start[lead, 0]) + ny * (start[p, 1] - start[lead, 1])
+                      + nz * (start[p, 2] - start[lead, 2]))
             after = before + nx * x + ny * y + nz * z
             if k == 0 or (k == 1 and two == 1):
                 low = min(low, before, after)
             else:
                 high = max(high, before, after)
             far = max(far, x * x + y * y + z * z)
-        if low - high >= LEAST * gap or far <= HOLD * HOLD * gap * gap:
+        most = HOLD * gap
+        if low - high >= LEAST * gap or far <= most * most or passes(continuous, start, now, gaps.point, g, two, LEAST * gap):
             continue
         for k in range(4):
-            p = gaps.point[g, k]
-            bound_one(now, start, frame, p, HOLD * gap, scale)
+            changed += bound_one(now, start, frame, moves, gaps.point[g, k], most, scale)
+    return changed
+
+
+@kernel
+def passes(continuous, start, now, point, g, edges, reach):
+    """Whether the features of a gap pass each other by on their ways as they are now."""
+    if continuous is None:
+        return False
+    return time_of_impact(start, now, point[g, 0], point[g, 1], point[g, 2], point[g, 3], edges, reach) == NEVER
 
 
 @inlined
-def bound_one(now, start, drift, p, most, scale):
-    """Point p may get so far at most, relative to the drift."""
-    x, y, z = now[p, 0] - start[p, 0] - drift[0], now[p, 1] - start[p, 1] - drift[1], now[p, 2] - start[p, 2] - drift[2]
-    squared = x * x + y * y + z * z
-    if squared > most * most:
-        scale[p] = min(scale[p], most / math.sqrt(squared))
+def bound_one(now, start, frame, moves, p, most, scale):
+    """Point p may get so far at most, relative to the frame. 1: it got farther and is held back."""
+    x, y, z = now[p, 0] - start[p, 0] - frame[0], now[p, 1] - start[p, 1] - frame[1], now[p, 2] - start[p, 2] - frame[2]
+    squared, changed = x * x + y * y + z * z, 0
+    if squared > most * most and moves[p]:
+        share = most / math.sqrt(squared)
+        changed = 1 if share < CLOSE else 0
+        scale[p] *= share
+        now[p, 0] = start[p, 0] + frame[0] + share * x
+        now[p, 1] = start[p, 1] + frame[1] + share * y
+        now[p, 2] = start[p, 2] + frame[2] + share * z
+    return changed
 
 
 @kernel
 def bound_ways(points, frame, drift, listing, scale):
     """No point gets farther from the drift than gaps were looked for with, or else, seen from the frame, than that may be."""
     if listing is None:
-        return
-    now, start, step = points.now, points.start, listing.step
+        return 0
+    now, start, moves, step, changed = points.now, points.start, points.moves, listing.step, 0
     beside = math.sqrt((drift[0] - frame[0])**2 + (drift[1] - frame[1])**2 + (drift[2] - frame[2])**2)
     u, v, w = drift[0], drift[1], drift[2]
     for p in range(scale.size):
         x, y, z = now[p, 0] - start[p, 0] - u, now[p, 1] - start[p, 1] - v, now[p, 2] - start[p, 2] - w
         if x * x + y * y + z * z > step[p] * step[p]:
-            bound_one(now, start, frame, p, step[p] + beside, scale)
+            changed += bound_one(now, start, frame, moves, p, step[p] + beside, scale)
+    return changed
 
 
 @kernel
-def together(wholes, scale):
-    """A rigid body is held back as a whole."""
+def hold_back(position, points, frame, wholes, scale, changed):
+    """Rigid bodies are held back as a whole: all of their particles as far as the first of them."""
     if wholes is None:
         return
+    if changed == 0:
+        return
+    now, start = points.now, points.start
     for b in range(wholes.size.size):
         first, stride, least = wholes.first[b], wholes.stride[b], 1.0
         last = first + wholes.size[b] * stride
@@ -424,6 +448,8 @@ def together(wholes, scale):
         if least < 1.0:
             for k in range(first, last, stride):
                 scale[k] = least
+                for i in range(3):
+                    now[k, i] = start[k, i] + frame[i] + least * (position[i, k] - start[k, i] - frame[i])
 
 
 @kernel

@@ -8,6 +8,7 @@ import math
 
 from verlet_numba._jit import formula, inlined, kernel
 from verlet_numba.buffers import NEARER
+from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.physics.closest import of_segments, on_triangle
 
 
@@ -108,7 +109,7 @@ def list_one(place, rest, same, moves, radius, body, point, kind, reach, left, a
 @formula
 def shared(i, j, k, l, edges):
     """Whether two features share a corner."""
-    return i == k or i == l or (edges == 0 and i == j) or (edges == 1 and (j == k or j == l))
+    return i in (k, l) or j == (i if edges == 0 else k) or (edges == 1 and j == l)
 
 
 @inlined
@@ -130,45 +131,46 @@ def distance_of(place, a, b, c, d, edges):
 
 
 @kernel
-def weights_of(place, a, b, c, d, edges):
-    """Weights of the four points at the closest points, those of the second feature below 0."""
-    if edges:
-        s, t, _ = of_segments(place[a, 0], place[a, 1], place[a, 2], place[b, 0], place[b, 1], place[b, 2],
-                              place[c, 0], place[c, 1], place[c, 2], place[d, 0], place[d, 1], place[d, 2])
-        return 1.0 - s, s, t - 1.0, -t
-    u, v, w, _ = on_triangle(place[a, 0], place[a, 1], place[a, 2], place[b, 0], place[b, 1], place[b, 2],
-                             place[c, 0], place[c, 1], place[c, 2], place[d, 0], place[d, 1], place[d, 2])
-    return 1.0, -u, -v, -w
-
-
-@kernel
-def find_gaps(points, listing, gaps):
+def find_gaps(points, listing, gaps, continuous):
     """Add the pairs that may touch in this substep to the gaps. False: no room.
 
-    A pair is looked at again as soon as the ways of its points may have used up what was left between them.
+    A pair is looked at again as soon as the ways of its points may have used up what was left between them. continuous: where
+    points go far their closest points are those at the time of impact, and what passes by is only kept from turning back.
     """
     start, path, step, left, point, edges, reach = (points.start, listing.path, listing.step, listing.left, listing.point,
                                                     listing.edges, listing.reach)
-    listed = gaps.listed[0]
+    now, weight, normal, listed = points.now, gaps.weight, gaps.normal, gaps.listed[0]
     for n in range(listing.made[0]):
         a, b, c, d, two = point[n, 0], point[n, 1], point[n, 2], point[n, 3], edges[n]
         way, onward = of_pair(path, a, b, c, d, two), of_pair(step, a, b, c, d, two)
         if left[n] >= way + onward:
             continue
-        p, q, r, s = weights_of(start, a, b, c, d, two)
-        x = p * start[a, 0] + q * start[b, 0] + r * start[c, 0] + s * start[d, 0]
-        y = p * start[a, 1] + q * start[b, 1] + r * start[c, 1] + s * start[d, 1]
-        z = p * start[a, 2] + q * start[b, 2] + r * start[c, 2] + s * start[d, 2]
-        distance = math.sqrt(x * x + y * y + z * z)
+        p, q, r, s, x, y, z, distance = apart_at(0.0, start, now, a, b, c, d, two)
         left[n] = distance - reach[n] + way
         if distance - reach[n] >= onward or distance == 0.0:
             continue
         if listed == gaps.gap.size:
             return False
-        gaps.point[listed, 0], gaps.point[listed, 1], gaps.point[listed, 2], gaps.point[listed, 3] = a, b, c, d
-        gaps.weight[listed, 0], gaps.weight[listed, 1], gaps.weight[listed, 2], gaps.weight[listed, 3] = p, q, r, s
-        gaps.normal[listed, 0], gaps.normal[listed, 1], gaps.normal[listed, 2] = x / distance, y / distance, z / distance
         gaps.gap[listed], gaps.reach[listed], gaps.edges[listed], gaps.push[listed] = distance, reach[n], two, 0.0
+        t = impact_of(continuous, start, now, a, b, c, d, two, distance, reach[n], onward)
+        if t == NEVER:
+            gaps.reach[listed] = -math.inf
+        elif t > 0.0:
+            p, q, r, s, x, y, z, distance = apart_at(t, start, now, a, b, c, d, two)
+        point_of = gaps.point
+        point_of[listed, 0], point_of[listed, 1], point_of[listed, 2], point_of[listed, 3] = a, b, c, d
+        weight[listed, 0], weight[listed, 1], weight[listed, 2], weight[listed, 3] = p, q, r, s
+        normal[listed, 0], normal[listed, 1], normal[listed, 2] = x / distance, y / distance, z / distance
         listed += 1
     gaps.listed[0] = listed
     return True
+
+
+@kernel
+def impact_of(continuous, start, now, a, b, c, d, edges, distance, reach, onward):
+    """The time of impact of two features that go farther than their reach; 0: where they are at the start will do."""
+    if continuous is None:
+        return 0.0
+    if onward <= reach or distance <= reach:
+        return 0.0
+    return time_of_impact(start, now, a, b, c, d, edges, reach)

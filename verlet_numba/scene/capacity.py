@@ -95,8 +95,8 @@ def roomier(effects: Effects) -> Effects:
         entities = rigid.bodies + touching + 1
         rigid = with_room(rigid, entities)
         touches = touches_of(touching, rigid.size.size)
-    return effects._replace(exact=roomier_exact(effects.exact), contact=contact, meet=meet, spheres=spheres, mixed=mixed, rigid=rigid, touches=touches,
-                            restitution=restitution)
+    return effects._replace(exact=roomier_exact(effects.exact), rapid=roomier_exact(effects.rapid), contact=contact, meet=meet,
+                            spheres=spheres, mixed=mixed, rigid=rigid, touches=touches, restitution=restitution)
 
 
 def copied(pairs: Pairs, capacity: int) -> Pairs:

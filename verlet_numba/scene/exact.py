@@ -1,45 +1,63 @@
 """Buffers of exact contact (effects/exact.py)."""
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
-from verlet_numba.buffers import NEARER, SPHERE, Contacts, Exact, Friction, Gaps, Listing, Points, Wholes, gate
+from verlet_numba.buffers import (
+    BOX,
+    CYLINDER,
+    NEARER,
+    SPHERE,
+    Contacts,
+    Exact,
+    Friction,
+    Gaps,
+    Listing,
+    Pieces,
+    Points,
+    Wholes,
+    gate,
+)
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid
 from verlet_numba.scene.numbering import Numbering, spread
 from verlet_numba.scene.pieces import Placed, at_rest, body_surfaces, of_solid, pieces_of
 from verlet_numba.scene.rigid import rigid_bodies
+from verlet_numba.scene.slipping import width
 from verlet_numba.scene.sphere_trees import candidates_of, spacing, stack_of
 
 LEAST_RADIUS = 1e-3     # of the deformable bodies' spacing: what has no thickness is still met from a distance
 FLOOR = 0.02            # of it: the step that is allowed for even where nothing moves
+RAPID = 0.25            # of the least thickness of rigid bodies and colliders: what goes farther in a substep is followed
+SHORT = 1e-3            # of that: how far from each other rigid bodies are stopped
+SIZES = {BOX: 3, SPHERE: 1, CYLINDER: 2}        # how many entries of their extent are half of a thickness
 
 
 def exact_of(bodies: list[Body], numbering: Numbering, found: list[Solid], contact: Contacts | None, together: Integers,
-             inverse_mass: Floats, belongs: Integers, friction: Friction | None, itself: bool, side: float) -> Exact | None:
+             inverse_mass: Floats, belongs: Integers, friction: Friction | None, itself: bool, continuous: bool, thick: bool,
+             side: float) -> Exact | None:
     """Exact contact of a scene's deformable bodies; None if they meet nothing.
 
     together (A, 2): particles that are attached; belongs (n,): rigid body or -1; itself: whether bodies meet themselves;
+    continuous: whether impacts are sought along the step; thick: whether radii count, or bodies meet as surfaces without any;
     side: the shortest stick of deformable bodies, m.
     """
     least, size = LEAST_RADIUS * side, len(inverse_mass)
+    if not thick:
+        bodies = [replace(body, shape=replace(body.shape, radius=0.0)) for body in bodies]
     soft = list(body_surfaces(bodies, numbering, False, least))
     others = list(body_surfaces(bodies, numbering, True, least))
-    corners, solids, radii = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
-    for s, solid in enumerate(found) if contact is not None else ():
-        if (surface := of_solid(solid)) is not None:
-            local = surface[0]
-            others.append(Placed(surface[1], (size + sum(map(len, solids)) + np.arange(len(local)))[None]))
-            corners.append(local)
-            solids.append(np.full(len(local), s))
-            radii.append(np.full(len(local), solid.extent[0] if solid.kind == SPHERE else 0.0))
+    corners = corners_of(found if contact is not None else [], size)
+    others += corners.placed
     several = sum(len(placed.points) for placed in soft) > 1 or itself
     if not soft or (not several and not others):
         return None
     pieces = pieces_of(soft, others)
-    points = points_of(bodies, numbering, found, np.concatenate(solids), np.concatenate(corners), np.concatenate(radii), together,
-                       inverse_mass, belongs, friction, least)
+    points = points_of(bodies, numbering, found, corners, together, inverse_mass, belongs, friction, least)
     count = len(points.free)
-    return Exact(pieces, points, 1 if itself else None, listing_of(pieces, count) if several else None,
+    return Exact(pieces, points, 1 if itself else None, 1 if continuous else None, listing_of(pieces, count) if several else None,
                  listing_of(pieces, count) if others else None, gaps_of(FIRST_ROOM), wholes_of(bodies, numbering),
                  gate(np.ones(count), np.float64), gate(np.zeros(3), np.float64), gate(np.zeros(3), np.float64), FLOOR * side,
                  least_reach(bodies, least), gate(np.zeros(3), np.int64))
@@ -59,14 +77,52 @@ def least_reach(bodies: list[Body], least: float) -> float:
     return min(found)
 
 
-def points_of(bodies: list[Body], numbering: Numbering, found: list[Solid], solid: Integers, local: Floats, rounding: Floats,
-              together: Integers, inverse_mass: Floats, belongs: Integers, friction: Friction | None, least: float) -> Points:
+def rapid_of(bodies: list[Body], numbering: Numbering, found: list[Solid], contact: Contacts | None, inverse_mass: Floats,
+             belongs: Integers) -> Exact | None:
+    """What stops rigid bodies that go far; None if there is none that may meet another one or a collider but planes."""
+    size, rigid = len(inverse_mass), list(body_surfaces(bodies, numbering, True, 0.0))
+    corners, count = corners_of(found if contact is not None else [], size), sum(len(placed.points) for placed in rigid)
+    if not (inverse_mass[belongs >= 0] > 0).any() or count + len(corners.placed) < 2:
+        return None
+    pieces = pieces_of(rigid, corners.placed)
+    points = points_of(bodies, numbering, found, corners, np.zeros((0, 2), np.int64), inverse_mass, belongs, None, 0.0)
+    total, wide = len(points.free), [width(body.shape) for body in bodies if body.shape.rigid]
+    far = RAPID * min(wide + [2 * min(solid.extent[:SIZES[solid.kind]]) for solid in found if solid.kind in SIZES])
+    return Exact(pieces, points, None, 1, listing_of(pieces, total) if count > 1 else None,
+                 listing_of(pieces, total) if corners.placed else None, gaps_of(FIRST_ROOM), wholes_of(bodies, numbering),
+                 gate(np.ones(total), np.float64), gate(np.zeros(3), np.float64), gate(np.zeros(3), np.float64), SHORT * far,
+                 far, gate(np.zeros(3), np.int64))
+
+
+class Corners(NamedTuple):
+    """The corners of colliders, numbered from n on: their surfaces, and of each its collider, place and radius."""
+
+    placed: list[Placed]
+    solid: Integers
+    local: Floats
+    rounding: Floats
+
+
+def corners_of(found: list[Solid], size: int) -> Corners:
+    """Of all colliders but planes, which vertices meet."""
+    placed, local, solid, rounding = [], [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for s, each in enumerate(found):
+        if (surface := of_solid(each)) is not None:
+            placed.append(Placed(surface[1], (size + sum(map(len, solid)) + np.arange(len(surface[0])))[None]))
+            local.append(surface[0])
+            solid.append(np.full(len(surface[0]), s))
+            rounding.append(np.full(len(surface[0]), each.extent[0] if each.kind == SPHERE else 0.0))
+    return Corners(placed, np.concatenate(solid), np.concatenate(local), np.concatenate(rounding))
+
+
+def points_of(bodies: list[Body], numbering: Numbering, found: list[Solid], corner: Corners, together: Integers,
+              inverse_mass: Floats, belongs: Integers, friction: Friction | None, least: float) -> Points:
     """The points: n particles, and the corners of colliders."""
-    size, corners = len(inverse_mass), len(solid)
+    size, corners = len(inverse_mass), len(corner.solid)
     count = size + corners
     deformable = spread(numbering, [float(not body.shape.rigid) for body in bodies], size) > 0
     radius = np.concatenate([spread(numbering, [0.0 if body.shape.rigid else max(body.shape.radius, least) for body in bodies],
-                                    size), rounding])
+                                    size), corner.rounding])
     body, rest, number = np.full(count, -1), np.zeros((count, 3)), 0
     for each, index in zip(bodies, numbering.bodies, strict=True):
         if not each.shape.rigid:
@@ -77,12 +133,14 @@ def points_of(bodies: list[Body], numbering: Numbering, found: list[Solid], soli
     held = np.zeros(int(belongs.max(initial=-1)) + 2, bool)
     held[belongs[inverse_mass > 0]] = True
     whole = np.where((belongs >= 0) & held[belongs], belongs, -1)
-    return Points(*(gate(np.zeros((count, 3)), np.float64) for _ in range(3)), gate(np.flatnonzero(deformable), np.int64),
-                  gate(np.concatenate([np.where(deformable, inverse_mass, 0.0), np.zeros(corners)]), np.float64),
-                  gate(moves, np.int64), gate(radius, np.float64),
-                  None if friction is None else gate(coefficients(friction, found, solid), np.float64),
-                  gate(joined(count, together), np.int64), gate(body, np.int64), gate(rest, np.float64),
-                  gate(np.concatenate([whole, np.full(corners, -1)]), np.int64), gate(solid, np.int64), gate(local.T, np.float64))
+    start, now, shift = (gate(np.zeros((count, 3)), np.float64) for _ in range(3))
+    own = None if friction is None else gate(coefficients(friction, found, corner.solid), np.float64)
+    return Points(start=start, now=now, shift=shift, soft=gate(np.flatnonzero(deformable), np.int64),
+                  free=gate(np.concatenate([np.where(deformable, inverse_mass, 0.0), np.zeros(corners)]), np.float64),
+                  moves=gate(moves, np.int64), radius=gate(radius, np.float64), friction=own,
+                  same=gate(joined(count, together), np.int64), body=gate(body, np.int64), rest=gate(rest, np.float64),
+                  whole=gate(np.concatenate([whole, np.full(corners, -1)]), np.int64), solid=gate(corner.solid, np.int64),
+                  local=gate(corner.local.T, np.float64))
 
 
 def coefficients(friction: Friction, found: list[Solid], solid: Integers) -> Floats:
@@ -111,7 +169,7 @@ def wholes_of(bodies: list[Body], numbering: Numbering) -> Wholes | None:
                   gate(np.zeros(len(index)), np.int64))
 
 
-def listing_of(pieces: object, count: int, room: int = FIRST_ROOM) -> Listing:
+def listing_of(pieces: Pieces, count: int, room: int = FIRST_ROOM) -> Listing:
     """Room for so many pairs of pieces and of features, none looked for yet."""
     return Listing(stack_of(pieces), candidates_of(room), gate([-1], np.int64), gate(np.zeros((room, 4)), np.int64),
                    gate(np.zeros(room), np.int64), gate(np.zeros(room), np.float64), gate(np.zeros(room), np.float64),
@@ -129,8 +187,11 @@ def roomier_exact(exact: Exact | None) -> Exact | None:
     """Room for twice as much of what was full: a list that could not be made, or else the gaps."""
     if exact is None:
         return None
-    grown = {name: listing_of(exact.pieces, len(exact.points.free), 2 * len(listing.left))
-             for name in ("among", "against") if (listing := getattr(exact, name)) is not None and listing.made[0] < 0}
-    if not grown:
-        grown["gaps"] = gaps_of(2 * len(exact.gaps.gap))
-    return exact._replace(**grown)
+    size, among, against = len(exact.points.free), exact.among, exact.against
+    if (among is None or among.made[0] >= 0) and (against is None or against.made[0] >= 0):
+        return exact._replace(gaps=gaps_of(2 * len(exact.gaps.gap)))
+    if among is not None and among.made[0] < 0:
+        among = listing_of(exact.pieces, size, 2 * len(among.left))
+    if against is not None and against.made[0] < 0:
+        against = listing_of(exact.pieces, size, 2 * len(against.left))
+    return exact._replace(among=among, against=against)

@@ -32,8 +32,8 @@ from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.capacity import manifold_of, meetings_of, narrow_of, pairs_of, search_of
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, solids_of
 from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests_on_faces
+from verlet_numba.scene.exact import exact_of, rapid_of
 from verlet_numba.scene.hulls import hulls_of
-from verlet_numba.scene.exact import exact_of
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.mesh_collider import meshes_of, ridges_of
 from verlet_numba.scene.numbering import Numbering
@@ -65,6 +65,7 @@ class Contact(NamedTuple):
     restitution: Restitution | None = None
     rest: Rest | None = None
     exact: Exact | None = None
+    rapid: Exact | None = None
 
 
 def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -82,7 +83,8 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
     hulls, meet = hulls_meeting(scene, bodies, numbering, found, belongs, inverse_mass)
     trees, spheres, points, mixed = soft_meeting(scene, bodies, numbering, together, inverse_mass, real)
     meets = meet is not None or mixed is not None
-    precise = scene.solver.deformable_contact == "exact" and any(not body.shape.rigid for body in bodies)
+    thick, continuous = scene.solver.deformable_contact == "exact", scene.effects.continuous_collision
+    precise = (thick or continuous) and any(not body.shape.rigid for body in bodies)
     if contact is None and not meets and spheres is None and not precise:
         return Contact()
     rigid = touches = features = None
@@ -95,12 +97,13 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
                             body_masses(bodies, numbering, inverse_mass, points))
     friction = friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None or precise, real)
     exact = exact_of(bodies, numbering, found, contact, together, inverse_mass, belongs, friction, scene.effects.self_collision,
-                     spacing_of(bodies)) if precise else None
+                     continuous, thick, spacing_of(bodies)) if precise else None
     return Contact(moving(found) if contact is not None else None, contact, meshes_of(found, size), hulls, meet, trees, spheres,
                    points, mixed, rigid, touches, features,
                    friction,
                    restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
-                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real), exact)
+                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real), exact,
+                   rapid_of(bodies, numbering, found, contact, inverse_mass, belongs) if continuous else None)
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,

@@ -13,7 +13,7 @@ from verlet_numba.scene.colliders import Solid
 from verlet_numba.scene.convex import CYLINDER_SIDES
 from verlet_numba.scene.hulls import hull_faces
 from verlet_numba.scene.numbering import Numbering
-from verlet_numba.scene.shapes import box, edges
+from verlet_numba.scene.shapes import box
 from verlet_numba.scene.sphere_trees import Tree, halved, halved_grid, spacing
 
 
@@ -158,8 +158,8 @@ def pieces_of(soft: list[Placed], others: list[Placed]) -> Pieces:
     return Pieces(trees, gate(nodes, np.int64), gate(skip, np.int64), gate(piece, np.int64),
                   gate(np.flatnonzero(piece >= 0), np.int64), gate(inner[np.argsort(-level[inner], kind="stable")], np.int64),
                   gate(np.zeros((len(skip), 6)), np.float64), gate(np.zeros(len(skip)), np.float64), gate(rectangle, np.int64),
-                  gate(np.zeros((len(skip), 12)), np.float64), gate(lattice, np.float64), gate(np.argsort(piece)[-count:], np.int64),
-                  gate(corner, np.int64),
+                  gate(np.zeros((len(skip), 12)), np.float64), gate(lattice, np.float64),
+                  gate(np.argsort(piece)[-count:], np.int64), gate(corner, np.int64),
                   *(gate(part, np.int64) for both in owned for part in both))
 
 

@@ -26,17 +26,31 @@ TOLERANCE = 1e-9            # relative: what rounding makes of a thickness that 
 
 def slipping(scene: Scene, bodies: list[Body]) -> Warnings:
     """All warnings of this page."""
-    yield from too_fast_for_colliders(scene, bodies)
-    yield from too_coarse(scene, bodies)
-    if len(bodies) <= MOST_BODIES:
-        yield from too_fast_for_bodies(scene, bodies)
-        yield from holes(scene, bodies)
+    exact = scene.solver.deformable_contact == "exact"
+    if not scene.effects.continuous_collision:
+        yield from too_fast_for_colliders(scene, bodies)
+        if len(bodies) <= MOST_BODIES:
+            yield from too_fast_for_bodies(scene, bodies)
+    if not exact:
+        yield from segments(bodies)
+        yield from too_coarse(scene, bodies)
+        if len(bodies) <= MOST_BODIES:
+            yield from holes(scene, bodies)
+
+
+def segments(bodies: list[Body]) -> Warnings:
+    """Sticks that shall collide, where only particles do."""
+    for index, body in enumerate(bodies):
+        if body.shape.segments and body.shape.kind == "particles":
+            yield ("bodies", index), "its segments meet nothing, only its particles do: set solver.deformable_contact to exact"
 
 
 def too_fast_for_colliders(scene: Scene, bodies: list[Body]) -> Warnings:
     """Bodies whose first substep may take them past a collider."""
     thin = [(collider, *_thickness(collider)) for collider in scene.colliders if collider.kind in _THICKNESS]
     for index, body in enumerate(bodies if thin else []):
+        if exact_and_soft(scene, body):
+            continue
         speed, own = top_speed(body), width(body.shape)
         for collider, thickness, own_speed in thin:
             limit = (thickness + own) / 2 if body.shape.rigid else thickness + own
@@ -53,13 +67,20 @@ def too_fast_for_bodies(scene: Scene, bodies: list[Body]) -> Warnings:
     speed, thickness = (np.array([of(body) for body in bodies]) for of in (top_speed, lambda body: width(body.shape)))
     reach, limit = (speed[:, None] + speed) / substeps_a_second(scene), (thickness[:, None] + thickness) / 2
     soft = np.array([not body.shape.rigid for body in bodies])
-    meet = (limit > 0) & (speed[:, None] >= speed) & (~np.eye(len(bodies), dtype=bool) | (_copies(bodies) > 1))
+    held = np.array([exact_and_soft(scene, body) for body in bodies])
+    meet = ~(held[:, None] | held) & (limit > 0)
+    meet &= (speed[:, None] >= speed) & (~np.eye(len(bodies), dtype=bool) | (_copies(bodies) > 1))
     meet &= ~(soft & (thickness == 0))[:, None] | ~soft         # points meet rigid bodies alone
     past = np.where(meet, reach / np.where(limit > 0, limit, 1), 0.0)
     for index, other in enumerate(past.argmax(axis=1)):
         if past[index, other] > 1:
             name = "another copy" if other == index else f"body {bodies[other].name}"
             yield ("bodies", index), _too_fast(scene, reach[index, other], limit[index, other], name)
+
+
+def exact_and_soft(scene: Scene, body: Body) -> bool:
+    """Whether exact contact lets a body pass through nothing, however fast it is."""
+    return scene.solver.deformable_contact == "exact" and not body.shape.rigid
 
 
 def _too_fast(scene: Scene, reach: float, limit: float, other: str) -> str:

@@ -34,7 +34,6 @@ def _is_not(word: object) -> Callable[[Any], bool]:
 _LEAVE_OUT = "leave the key out"
 
 NOT_BUILT = (
-    Missing("effects.continuous_collision", _is(True), _LEAVE_OUT),
     Missing("effects.bending", _named, _LEAVE_OUT),
 )
 
