@@ -27,6 +27,7 @@ SCENES = {
     "free": worlds.FREE,
     "paper": worlds.PAPER,
     "chains": worlds.CHAINS,
+    "exact": worlds.with_changes(worlds.PRECISE, effects={"friction": 0.3}),
     "step start": worlds.with_changes(worlds.EVERYTHING, solver={"gradient": "step_start"}),
     "empty": {"time": {"duration": 1}, "effects": {}},
     "meshes": worlds.with_changes(worlds.EVERYTHING, colliders=[
