@@ -10,12 +10,22 @@ pass is held back short of its impact. All this comes before contacts are sought
 import math
 
 from verlet_numba._jit import kernel
-from verlet_numba.effects.exact import begin_wholes, bound_gaps, bring, bring_corners, hold_back, open_gap, take_back
+from verlet_numba.effects.exact import (
+    begin_wholes,
+    bound_gaps,
+    bring,
+    bring_corners,
+    give_of_whole,
+    hold_back,
+    shove_whole,
+    take_back,
+)
 from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.kernels.near_features import list_features, of_pair
 from verlet_numba.kernels.pieces import list_against_others, list_among, update_pieces
 
-ROUNDS = 16             # through the impacts: they are few
+ROUNDS = 256            # through the impacts, at most: they are few
+SETTLED = 1e-6          # of the largest impulse: a round that changes less is the last
 
 
 @kernel
@@ -91,19 +101,30 @@ def find_impacts(rapid, listing, among):
 
 @kernel
 def answer(position, previous, inverse_mass, rapid):
-    """Give the bodies the impulses of their impacts, round by round, and hold back what they do not stop."""
+    """Give the bodies the impulses of their impacts, and hold back what they do not stop.
+
+    Impulses push only; a round may take back what an earlier one gave too much (projected Gauss-Seidel).
+    """
     points, gaps, wholes, scale, frame = rapid.points, rapid.gaps, rapid.wholes, rapid.scale, rapid.frame
     now = points.now
     begin_wholes(wholes)
     for _ in range(ROUNDS):
+        change = largest = 0.0
         for g in range(gaps.listed[0]):
-            x = y = z = 0.0
+            nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
+            across = 0.0
             for k in range(4):
                 p, w = gaps.point[g, k], gaps.weight[g, k]
-                x, y, z = x + w * now[p, 0], y + w * now[p, 1], z + w * now[p, 2]
-            push = gaps.reach[g] - (x * gaps.normal[g, 0] + y * gaps.normal[g, 1] + z * gaps.normal[g, 2])
-            if push > 0.0:
-                open_gap(position, previous, inverse_mass, points, wholes, gaps, g, push, x, y, z)
+                across += w * (nx * now[p, 0] + ny * now[p, 1] + nz * now[p, 2])
+            give = give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz)
+            if give > 0.0:
+                given = gaps.push[g]
+                gaps.push[g] = max(0.0, given + (gaps.reach[g] - across) / give)
+                f = gaps.push[g] - given
+                shove_whole(position, points, wholes, gaps, g, f * nx, f * ny, f * nz, 0.0, 0.0, 0.0)
+                change, largest = max(change, abs(f)), max(largest, gaps.push[g])
+        if change <= SETTLED * largest:
+            break
     take_back(position, previous, points)
     for k in range(scale.size):
         scale[k] = 1.0

@@ -12,8 +12,9 @@ passes by is let pass.
 
 **Nothing passes through.** A gap is safe if one fixed plane keeps its two features apart at the start and at the end of
 their straight ways: then it does so on the way, and whatever part of its step each point takes. Points of any other gap may
-go HOLD of the gap at most, so that what is left of it is more than nothing. And no point gets farther than the step that
-gaps were looked for with. So every way taken is free of crossings, as long as what paths prescribe leaves room. After Wu,
+go HOLD of the gap at most, so that what is left of it is more than nothing. Where points have got farther than gaps were
+looked for with, they are looked for again. So every way taken is free of crossings, as long as what paths prescribe leaves
+room. After Wu,
 Wang & Wang 2020 (A Safe and Fast Repulsion Method for GPU-based Cloth Self Collisions) and Chen, Diaz, Yuksel 2025 (Offset
 Geometric Contact), which bound the step of every vertex by its distances.
 """
@@ -32,7 +33,7 @@ from verlet_numba.kernels.pieces import list_against_others, list_among, update_
 from verlet_numba.physics.friction import held
 from verlet_numba.physics.rigid import cross, times_symmetric
 
-GROWTH = 1.25           # times the step that a point is about to take: how far it may get, with the floor added
+GROWTH = 1.25           # times the step that a point is about to take: how far it is expected to get, with the floor added
 LASTING = 4.0           # steps that a list shall last
 SLACK = 2.0             # times the floor: and what it may need beside
 HOLD = 0.45             # of a gap: how far its points may go if no plane keeps them apart; below one half
@@ -53,7 +54,19 @@ def find_exact(position, previous, contact, exact):
     if not find_against(exact, exact.against):
         return False
     choose_frame(gaps.listed[0] > 0, exact.drift, exact.frame, exact.least)
-    return find_among(exact, exact.among)
+    fits = find_among(exact, exact.among) and 2 * gaps.listed[0] <= gaps.gap.size
+    return spare(exact.among) and spare(exact.against) and fits
+
+
+@kernel
+def spare(listing):
+    """Whether a list leaves half of its room free, so that it may be made again at the end of the substep; else it is undone."""
+    if listing is None:
+        return True
+    if 2 * listing.made[0] <= listing.left.size and 2 * listing.pairs.listed[0] <= listing.pairs.first.size:
+        return True
+    listing.made[0] = -1
+    return False
 
 
 @kernel
@@ -115,13 +128,7 @@ def find_against(exact, listing):
         return True
     points, drift = exact.points, exact.drift
     bound_steps(points.start, points.now, drift, math.sqrt(drift[0]**2 + drift[1]**2 + drift[2]**2), exact.floor, listing.step)
-    if outdated(listing):
-        renew(points, exact.pieces, exact.floor, listing)
-        exact.tally[0] += 1
-        if not (list_against_others(exact.pieces, listing.stack, listing.pairs)
-                and list_features(points.start, points, exact.pieces, listing)):
-            return False
-    return find_gaps(points, listing, exact.gaps, exact.continuous)
+    return find_again(exact, listing, None)
 
 
 @kernel
@@ -131,14 +138,29 @@ def find_among(exact, listing):
         return True
     points = exact.points
     bound_steps(points.start, points.now, exact.drift, 0.0, exact.floor, listing.step)
+    return find_again(exact, listing, 1)
+
+
+@kernel
+def find_again(exact, listing, among):
+    """Add the gaps that the present steps may close, from a new list if that is called for. False: no room."""
+    points = exact.points
     if outdated(listing):
         renew(points, exact.pieces, exact.floor, listing)
-        update_edges(points.start, exact.pieces)
         exact.tally[0] += 1
-        if not (list_among(exact.pieces, exact.itself, listing.stack, listing.pairs)
+        if not (list_pieces(points.start, exact.pieces, exact.itself, listing, among)
                 and list_features(points.start, points, exact.pieces, listing)):
             return False
     return find_gaps(points, listing, exact.gaps, exact.continuous)
+
+
+@kernel
+def list_pieces(place, pieces, itself, listing, among):
+    """List the pairs of pieces among deformable bodies, or if `among` is None of those against others. False: no room."""
+    if among is None:
+        return list_against_others(pieces, listing.stack, listing.pairs)
+    update_edges(place, pieces)
+    return list_among(pieces, itself, listing.stack, listing.pairs)
 
 
 @kernel
@@ -348,8 +370,10 @@ def limit_exact(position, exact):
             now[k, i] = x[k]
     for k in range(scale.size):
         scale[k] = 1.0
-    changed = bound_ways(points, frame, exact.drift, exact.among, scale) + bound_ways(points, frame, frame, exact.against, scale)
-    hold_back(position, points, frame, exact.wholes, scale, changed)
+    if not (farther_against(exact, exact.against) and farther_among(exact, exact.among)):
+        for k in range(scale.size):         # more is near all at once than there is room for: this time nothing moves
+            bound_one(now, points.start, frame, points.moves, k, 0.0, scale)
+        hold_back(position, points, frame, exact.wholes, scale, 1)
     changed = 1
     while changed > 0:                      # what was taken to pass by may hit what is held back
         changed = bound_gaps(points, frame, exact.gaps, scale, exact.continuous)
@@ -418,18 +442,43 @@ def bound_one(now, start, frame, moves, p, most, scale):
 
 
 @kernel
-def bound_ways(points, frame, drift, listing, scale):
-    """No point gets farther from the drift than gaps were looked for with, or else, seen from the frame, than that may be."""
+def farther_against(exact, listing):
+    """If points have got farther than gaps with rigid bodies and colliders were looked for: look again. False: no room."""
     if listing is None:
-        return 0
-    now, start, moves, step, changed = points.now, points.start, points.moves, listing.step, 0
-    beside = math.sqrt((drift[0] - frame[0])**2 + (drift[1] - frame[1])**2 + (drift[2] - frame[2])**2)
-    u, v, w = drift[0], drift[1], drift[2]
-    for p in range(scale.size):
+        return True
+    gaps, zero = exact.gaps, 0.0
+    if not widened(exact.points, zero, zero, zero, listing.step):
+        return True
+    listed = gaps.listed[0]
+    if not find_again(exact, listing, None):
+        return False
+    if gaps.listed[0] > listed:
+        choose_frame(True, exact.drift, exact.frame, exact.least)
+    return True
+
+
+@kernel
+def farther_among(exact, listing):
+    """The same of gaps between deformable bodies."""
+    if listing is None:
+        return True
+    drift = exact.drift
+    if not widened(exact.points, drift[0], drift[1], drift[2], listing.step):
+        return True
+    return find_again(exact, listing, 1)
+
+
+@kernel
+def widened(points, u, v, w, step):
+    """Whether a point has got farther than expected, relative to (u, v, w): it is expected to now."""
+    now, start, found = points.now, points.start, 0
+    for p in range(step.size):
         x, y, z = now[p, 0] - start[p, 0] - u, now[p, 1] - start[p, 1] - v, now[p, 2] - start[p, 2] - w
-        if x * x + y * y + z * z > step[p] * step[p]:
-            changed += bound_one(now, start, frame, moves, p, step[p] + beside, scale)
-    return changed
+        squared = x * x + y * y + z * z
+        if squared > step[p] * step[p]:
+            step[p] = math.sqrt(squared)
+            found += 1
+    return found > 0
 
 
 @kernel

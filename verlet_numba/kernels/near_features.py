@@ -97,7 +97,7 @@ def list_one(place, rest, same, moves, radius, body, point, kind, reach, left, a
     nearest = whole
     if distance < far and body[a] >= 0 and body[a] == body[d]:
         nearest = min(whole, NEARER * distance_of(rest, a, b, c, d, edges))
-    if distance >= far - whole + nearest:
+    if not distance < far - whole + nearest:
         return listed
     if listed == left.size:
         return -1
@@ -147,7 +147,7 @@ def find_gaps(points, listing, gaps, continuous):
             continue
         p, q, r, s, x, y, z, distance = apart_at(0.0, start, now, a, b, c, d, two)
         left[n] = distance - reach[n] + way
-        if distance - reach[n] >= onward or distance == 0.0:
+        if not distance - reach[n] < onward or distance == 0.0:
             continue
         if listed == gaps.gap.size:
             return False

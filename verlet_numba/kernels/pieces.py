@@ -143,9 +143,9 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
 
 @inlined
 def apart(box, k, l):
-    """Whether the boxes of two nodes have nothing in common."""
-    return (box[k, 0] > box[l, 3] or box[l, 0] > box[k, 3] or box[k, 1] > box[l, 4] or box[l, 1] > box[k, 4]
-            or box[k, 2] > box[l, 5] or box[l, 2] > box[k, 5])
+    """Whether the boxes of two nodes have nothing in common, or are not numbers."""
+    return not (box[k, 0] <= box[l, 3] and box[l, 0] <= box[k, 3] and box[k, 1] <= box[l, 4] and box[l, 1] <= box[k, 4]
+                and box[k, 2] <= box[l, 5] and box[l, 2] <= box[k, 5])
 
 
 @inlined

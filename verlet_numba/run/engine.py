@@ -26,6 +26,7 @@ def start(model: Model) -> Model:
     x0 - v0 h alone would put an error of -g h t/2 into free fall.
     """
     particles, h = model.world.particles, model.world.solver.step
+    forget_near(model.world)
     position, velocity = initial(model)
     velocity *= particles.inverse_mass > 0
     particles.position[:] = position
@@ -34,6 +35,15 @@ def start(model: Model) -> Model:
         accelerate(model.world)
         particles.previous[:] = position - velocity * h + 0.5 * h**2 * particles.acceleration
     return model
+
+
+def forget_near(world: World) -> None:
+    """What was near in another run is not known to be now: exact contact counts ways, it does not compare places."""
+    if (exact := world.effects.exact) is not None:
+        exact.gaps.listed[:] = 0
+        for listing in (exact.among, exact.against):
+            if listing is not None:
+                listing.made[:] = -1
 
 
 def initial(model: Model) -> tuple[Array, Array]:

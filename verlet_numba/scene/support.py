@@ -15,20 +15,8 @@ class Missing(NamedTuple):
     instead: str
 
 
-def _any(value: Any) -> bool:
-    return True
-
-
 def _named(value: Any) -> bool:
     return value is not None
-
-
-def _is(word: object) -> Callable[[Any], bool]:
-    return lambda value: bool(value == word)
-
-
-def _is_not(word: object) -> Callable[[Any], bool]:
-    return lambda value: bool(value != word)
 
 
 _LEAVE_OUT = "leave the key out"
