@@ -130,7 +130,7 @@ def answer(position, previous, inverse_mass, rapid):
         scale[k] = 1.0
     changed = 1
     while changed > 0:
-        changed = bound_gaps(points, frame, gaps, scale, 1)
+        changed = bound_gaps(points, frame, gaps, rapid.floor, scale, 1)
         hold_back(position, points, frame, wholes, scale, changed)
     for k in range(position.shape[1]):
         if scale[k] < 1.0:

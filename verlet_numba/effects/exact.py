@@ -376,7 +376,7 @@ def limit_exact(position, exact):
         hold_back(position, points, frame, exact.wholes, scale, 1)
     changed = 1
     while changed > 0:                      # what was taken to pass by may hit what is held back
-        changed = bound_gaps(points, frame, exact.gaps, scale, exact.continuous)
+        changed = bound_gaps(points, frame, exact.gaps, exact.floor, scale, exact.continuous)
         hold_back(position, points, frame, exact.wholes, scale, changed)
     held_back = 0
     for k in range(position.shape[1]):
@@ -392,8 +392,11 @@ def limit_exact(position, exact):
 
 
 @kernel
-def bound_gaps(points, frame, gaps, scale, continuous):
-    """Points of gaps that nothing keeps open may go a part of them at most. How many are held back more than before."""
+def bound_gaps(points, frame, gaps, floor, scale, continuous):
+    """Points of gaps that nothing keeps open may go a part of them at most. How many are held back more than before.
+
+    What passes by does so at a part of `floor` [m] at least.
+    """
     now, start, moves, changed = points.now, points.start, points.moves, 0
     for g in range(gaps.listed[0]):
         gap, two, low, high, far = gaps.gap[g], gaps.edges[g], np.inf, -np.inf, 0.0
@@ -411,7 +414,8 @@ def bound_gaps(points, frame, gaps, scale, continuous):
                 high = max(high, before, after)
             far = max(far, x * x + y * y + z * z)
         most = HOLD * gap
-        if low - high >= LEAST * gap or far <= most * most or passes(continuous, start, now, gaps.point, g, two, LEAST * gap):
+        if low - high >= LEAST * gap or far <= most * most or passes(
+                continuous, start, now, gaps.point, g, two, LEAST * min(gap, floor)):
             continue
         for k in range(4):
             changed += bound_one(now, start, frame, moves, gaps.point[g, k], most, scale)
