@@ -35,7 +35,6 @@ from verlet_numba.physics.rigid import cross, times_symmetric
 
 GROWTH = 1.25           # times the step that a point is about to take: how far it is expected to get, with the floor added
 LASTING = 4.0           # steps that a list shall last
-SLACK = 2.0             # times the floor: and what it may need beside
 HOLD = 0.45             # of a gap: how far its points may go if no plane keeps them apart; below one half
 LEAST = 0.1             # of a gap: what a plane has to leave of it
 CLOSE = 1.0 - 1e-9      # of a step: held back by less than the rest, it is not held back
@@ -146,7 +145,7 @@ def find_again(exact, listing, among):
     """Add the gaps that the present steps may close, from a new list if that is called for. False: no room."""
     points = exact.points
     if outdated(listing):
-        renew(points, exact.pieces, exact.floor, listing)
+        renew(points, exact.pieces, listing)
         exact.tally[0] += 1
         if not (list_pieces(points.start, exact.pieces, exact.itself, listing, among)
                 and list_features(points.start, points, exact.pieces, listing)):
@@ -183,12 +182,12 @@ def outdated(listing):
 
 
 @kernel
-def renew(points, pieces, floor, listing):
+def renew(points, pieces, listing):
     """A list is to be made from where the points are at the start: their ways begin anew."""
     path, step, slack = listing.path, listing.step, listing.slack
     listing.made[0] = -1
     for p in range(path.size):
-        path[p], slack[p] = 0.0, LASTING * (step[p] - floor) + SLACK * floor
+        path[p], slack[p] = 0.0, LASTING * step[p]
     update_pieces(points.start, points.radius, slack, pieces)
 
 
