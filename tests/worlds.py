@@ -69,6 +69,19 @@ FREE = {
 """Gravity alone: runs, sticks and angles in free flight. Scenes made from it share one compiled frame loop."""
 
 
+PRECISE = {
+    "time": {"duration": 1, "frame_rate": 60},
+    "solver": {"substeps": 4, "deformable_contact": "exact"},
+    "effects": {"gravity": [0, 0, -9.81], "self_collision": True, "continuous_collision": True},
+    "bodies": [
+        {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 3], "mass": 0.2, "position": [0, 0, 0.35]},
+        {"kind": "rope", "name": "line", "start": [-0.4, 0, 0.5], "end": [0.4, 0.1, 0.5], "segments": 6, "mass": 0.1,
+         "thickness": 0.02},
+        {"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 0.5, "position": [0, 0, 0.7], "velocity": [0, 0, -2]}],
+    "colliders": [{"kind": "plane"}, {"kind": "box", "size": [0.2, 0.2, 0.3], "position": [0, 0, 0.15]}],
+    "output": {"precision": "float64"}}
+"""A cloth on a post, a rope and a die that fall on it: exact contact, and impacts along the step."""
+
 CHAINS = {
     "time": {"duration": 1, "frame_rate": 60},
     "solver": {"order": "lines", "substeps": 6, "iterations": 2},

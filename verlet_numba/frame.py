@@ -6,12 +6,14 @@ the loop.
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers import ARRESTED, FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.bending import unbend
 from verlet_numba.effects.contact import penetration, separate, touching
+from verlet_numba.effects.continuous import arrest
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
+from verlet_numba.effects.exact import deepest_gap, find_exact, limit_exact, part_exact, pushing_gaps
 from verlet_numba.effects.features import begin_features, part_features, rub_features
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
@@ -70,7 +72,7 @@ def advance(world, frames, budget):
     position, previous, inverse_mass, acceleration = particles
     gravity, wind, drag, damping, carried, moving = effects[:6]
     contact, meshes, hulls, meet, trees, spheres, points, mixed, rigid, touches, features = effects[6:17]
-    friction, restitution, rest, orientation, bending = effects[17:]
+    friction, restitution, rest, exact, rapid, orientation, bending = effects[17:]
     h, substeps, passes, tolerance, approximate = solver
     while clock[FRAME] < len(frames.measures):
         while clock[SUBSTEP] < substeps:
@@ -81,7 +83,8 @@ def advance(world, frames, budget):
                 end = (clock[NUMBER] + 1) * h
                 begin(stopwatch, clock[NUMBER])
                 if clock[SUBSTEP] == substeps - 1:
-                    keep(position, previous, snapshot, pushing(touches, features, meet, mixed) + touching_spheres(spheres))
+                    keep(position, previous, snapshot,
+                         pushing(touches, features, meet, mixed) + touching_spheres(spheres) + pushing_gaps(exact))
                     touching(contact, snapshot.touching)
                     lap(stopwatch, FRAMES)
                 settle(position, previous, clock[NUMBER], rest, contact, hulls, meet, points, mixed, touches, features)
@@ -104,15 +107,20 @@ def advance(world, frames, budget):
                 carry(position, end, carried)
                 move(contact, end, moving)
                 hold(position, previous, inverse_mass, rest)
-                move_hulls(hulls, contact, moving)
                 lap(stopwatch, PATHS)
+                clock[STAGE] = INTEGRATED
+            if clock[STAGE] == INTEGRATED:
+                if not arrest(position, previous, inverse_mass, contact, rapid):
+                    return FULL
+                move_hulls(hulls, contact, moving)
                 gather(position, hulls)
                 gather(position, points)
-                clock[STAGE] = INTEGRATED
+                clock[STAGE] = ARRESTED
             while True:                                                     # once, and again where resting bodies wake
                 if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
                         and find_meetings(hulls, meet, rest)
-                        and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)):
+                        and find_soft(position, inverse_mass, trees, spheres) and find_mixed(position, points, trees, mixed)
+                        and find_exact(position, previous, contact, exact)):
                     drop(stopwatch)
                     return FULL
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, points, mixed,
@@ -170,6 +178,7 @@ def advance(world, frames, budget):
                                                                approximate, start)
                 snapshot.counts[RELAXED] += relax_angles(position, inverse_mass, angles, tolerance)
                 lap(stopwatch, RELAXATION)
+            part_exact(position, previous, inverse_mass, contact, exact)    # contact of cloth and ropes has the last word
             keep_orientation(position, previous, orientation)
             bounce(position, previous, contact, restitution)
             keep_colliders(contact, rigid, touches)
@@ -182,6 +191,7 @@ def advance(world, frames, budget):
             rub_features(position, previous, inverse_mass, mixed, points, features, friction, MIXED)
             rub_spheres(position, previous, inverse_mass, spheres, friction)
             hold(position, previous, inverse_mass, rest)
+            limit_exact(position, exact)
             lap(stopwatch, REBOUND)
             clock[NUMBER] += 1
             clock[SUBSTEP] += 1
@@ -192,7 +202,8 @@ def advance(world, frames, budget):
         frames.measures[f, PENETRATION] = max(
             frames.measures[f, PENETRATION],
             deepest_in_meshes(snapshot.position, inverse_mass, contact, meshes), depth_of_hulls(snapshot.position, meet, hulls),
-            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest))
+            deepest(snapshot.position, spheres), depth_of_hulls(snapshot.position, mixed, points), depth_at_rest(rest),
+            deepest_gap(exact))
         frames.measures[f, RESTING] = at_rest(rest)
         record(frames.position[f], snapshot.position, observed.scene_order, observed.instances)
         record_velocity(frames.velocity, f, position, snapshot.before, observed.scene_order, observed.instances, h)

@@ -18,7 +18,8 @@ OCCURS = {
     "sphere_tree.update_layered": {"spheres", "mixed"}, "rigid.inverse_symmetric": {"rigid"}, "islands.sort_islands": {"touches"},
     "features.part_of_the_way": {"features"}, "friction.held": {"friction"}, "restitution.impact": {"restitution"},
     "relax_graph.sort_bodies": {"graph", "collided"}, "relax_lines.solve": {"lines"}, "relax_started.part": {"start"},
-    "mesh_contact.meet_mesh": {"meshes"}, "rest.count_slow": {"rest"},
+    "mesh_contact.meet_mesh": {"meshes"},
+    "near_features.find_gaps": {"exact"}, "continuous.find_impacts": {"rapid"}, "rest.count_slow": {"rest"},
     "orientation.volume": {"orientation"}, "hinge.gradients": {"bending"}, "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
 EFFECTS = set(Effects._fields)
@@ -32,11 +33,13 @@ SOFT = {"trees", "spheres"}
 MIX = {*SOFT, "points", "mixed"}
 MEET = {"hulls", "meet"}
 WHOLE = {"rigid", "touches"}
+FOLLOWED = {"exact", "rapid"}
 CONSTRAINTS = {"paper": {"graph", "collided"}, "chains": {"lines"}, "step start": {"start"}}
 """Parts of the world, beside effects, that scenes have."""
 SCENES = {
-    "everything": (worlds.EVERYTHING, EFFECTS - {"features", "bending"}),
-    "paper": (worlds.PAPER, EFFECTS - WHOLE - {"orientation", "bending"}),
+    "everything": (worlds.EVERYTHING, EFFECTS - {"features", "bending", *FOLLOWED}),
+    "exact": (worlds.PRECISE, {"gravity", "contact", "hulls", "meet", "trees", "points", "mixed", *WHOLE, *FOLLOWED}),
+    "paper": (worlds.PAPER, EFFECTS - WHOLE - {"orientation", "bending", *FOLLOWED}),
     "colliders at rest": (worlds.with_changes(worlds.EVERYTHING, effects=CALM, bodies=BARE, colliders=STILL, output={"fields": []}),
                           {"gravity", "contact", "orientation", *MEET, *MIX, *WHOLE}),
     "a crate on the floor": (worlds.FREE | {"bodies": [*worlds.FREE["bodies"][1:], *RIGID], "colliders": [{"kind": "plane"}],

@@ -30,6 +30,7 @@ SCENES = {
     "free": worlds.FREE,
     "paper": worlds.PAPER,
     "chains": worlds.CHAINS,
+    "exact": worlds.with_changes(worlds.PRECISE, effects={"friction": 0.3}),
     "step start": worlds.with_changes(worlds.EVERYTHING, solver={"gradient": "step_start"}),
     "bending": worlds.with_changes(worlds.CHAINS, effects={"bending": {"stiffness": 0.5}}),
     "empty": {"time": {"duration": 1}, "effects": {}},

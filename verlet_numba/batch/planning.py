@@ -22,7 +22,6 @@ from verlet_numba.scene.overrides import Given, lay_over
 from verlet_numba.scene.problems import MAX_PROBLEMS, Problem, SceneError
 from verlet_numba.scene.schema import Scene
 from verlet_numba.scene.source import Source, start_of
-from verlet_numba.scene.support import unsupported
 from verlet_numba.study.sweep_folder import FORMAT
 
 ID = 16             # hexadecimal digits of an id
@@ -104,7 +103,7 @@ def laid(document: Document, point: Sequence[Choice]) -> Source:
 def scene_at(document: Document, point: Sequence[Choice]) -> Loaded:
     """The scene of a point. Raises SceneError."""
     loaded = validate(laid(document, point))
-    problems = [*unsupported(loaded), *unreadable(loaded)]
+    problems = unreadable(loaded)
     if problems:
         raise SceneError(problems)
     return loaded

@@ -29,6 +29,7 @@ def start(model: Model) -> Model:
     x0 - v0 h alone would put an error of -g h t/2 into free fall.
     """
     particles, h = model.world.particles, model.world.solver.step
+    forget_near(model.world)
     position, velocity = model.given()
     velocity *= particles.inverse_mass > 0
     particles.position[:] = position
@@ -47,6 +48,15 @@ def spread_over(model: Model, threads: int) -> Model:
         meet = meet._replace(beside=beside_of(meet.narrow, CHUNKS))
         model.world = model.world._replace(effects=model.world.effects._replace(meet=meet))
     return model
+
+
+def forget_near(world: World) -> None:
+    """What was near in another run is not known to be now: exact contact counts ways, it does not compare places."""
+    if (exact := world.effects.exact) is not None:
+        exact.gaps.listed[:] = 0
+        for listing in (exact.among, exact.against):
+            if listing is not None:
+                listing.made[:] = -1
 
 
 def restate(model: Model, chunk: Frames) -> None:
@@ -144,6 +154,10 @@ class State:
         if effects.mixed is not None:
             mixed = effects.mixed
             arrays += [*mixed.candidates, mixed.at, *mixed.pairs, *mixed.meetings]
+        if effects.exact is not None:
+            exact = effects.exact
+            arrays += [*exact.gaps, exact.tally, *(part for listing in (exact.among, exact.against) if listing is not None
+                                                   for part in listing[2:])]
         if rest is not None:
             arrays += [rest.awake, rest.free, rest.anchor, rest.quiet, rest.resting, rest.slow, rest.since, rest.island, rest.depth]
         return tuple(arrays)

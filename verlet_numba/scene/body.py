@@ -31,6 +31,7 @@ class Shape:
     triangles: Integers = field(default_factory=lambda: np.zeros((0, 3), np.int64))  # (F, 3)
     lines: tuple[Integers, ...] = ()                                                 # polylines, for files and pictures
     parts: tuple[Integers, ...] = ()                    # particles at the corners of each convex part; none: it is convex
+    segments: bool = False              # whether its sticks collide as capsules where contact is exact
     notes: tuple[str, ...] = ()                         # what is to be said of the file it comes from
 
 

@@ -24,6 +24,7 @@ from verlet_numba.buffers import (
     gate,
 )
 from verlet_numba.scene.colliders import room
+from verlet_numba.scene.exact import roomier_exact
 from verlet_numba.scene.rigid import touches_of, with_room
 from verlet_numba.scene.sphere_trees import candidates_of
 
@@ -90,8 +91,11 @@ def roomier(effects: Effects) -> Effects:
 
     Raises CrowdedError where that would take more pairs than are listed at most.
     """
+    lists = effects.contact, effects.meet, effects.spheres, effects.mixed
     effects = effects._replace(contact=_roomier_contacts(effects.contact), meet=_roomier_meet(effects.meet),
                                spheres=_roomier_spheres(effects.spheres), mixed=_roomier_mixed(effects.mixed))
+    if all(one is other for one, other in zip(lists, (effects.contact, effects.meet, effects.spheres, effects.mixed), strict=True)):
+        effects = effects._replace(exact=roomier_exact(effects.exact), rapid=roomier_exact(effects.rapid))
     contact, meet, mixed, rigid, restitution = effects.contact, effects.meet, effects.mixed, effects.rigid, effects.restitution
     if contact is not None and restitution is not None and restitution.rebound.size < contact.particle.size:
         effects = effects._replace(restitution=restitution._replace(rebound=real(contact.particle.size)))

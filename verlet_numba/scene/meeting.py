@@ -11,6 +11,7 @@ from verlet_numba.buffers import (
     PRINTED,
     Array,
     Contacts,
+    Exact,
     Features,
     Friction,
     Hulls,
@@ -31,6 +32,7 @@ from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.capacity import manifold_of, meetings_of, narrow_of, pairs_of, search_of
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, solids_of
 from verlet_numba.scene.convex import hulls_and_particles, hulls_of_scene, rests_on_faces
+from verlet_numba.scene.exact import exact_of, rapid_of
 from verlet_numba.scene.hulls import hulls_of
 from verlet_numba.scene.materials import friction_of, restitution_of
 from verlet_numba.scene.mesh_collider import meshes_of, ridges_of
@@ -62,6 +64,8 @@ class Contact(NamedTuple):
     friction: Friction | None = None
     restitution: Restitution | None = None
     rest: Rest | None = None
+    exact: Exact | None = None
+    rapid: Exact | None = None
 
 
 def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Numbering, together: Integers, inverse_mass: Floats,
@@ -79,7 +83,9 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
     hulls, meet = hulls_meeting(scene, bodies, numbering, found, belongs, inverse_mass)
     trees, spheres, points, mixed = soft_meeting(scene, bodies, numbering, together, inverse_mass, real)
     meets = meet is not None or mixed is not None
-    if contact is None and not meets and spheres is None:
+    thick, continuous = scene.solver.deformable_contact == "exact", scene.effects.continuous_collision
+    precise = (thick or continuous) and any(not body.shape.rigid for body in bodies)
+    if contact is None and not meets and spheres is None and not precise:
         return Contact()
     rigid = touches = features = None
     if as_whole and (contact is not None or meets):
@@ -89,11 +95,15 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
     if scene.solver.response == "feature" and meets:
         features = Features(POINTS[scene.solver.projection_point], body_masses(bodies, numbering, inverse_mass, hulls),
                             body_masses(bodies, numbering, inverse_mass, points))
+    friction = friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None or precise, real)
+    exact = exact_of(bodies, numbering, found, contact, together, inverse_mass, belongs, friction, scene.effects.self_collision,
+                     continuous, thick, spacing_of(bodies)) if precise else None
     return Contact(moving(found) if contact is not None else None, contact, meshes_of(found, size), hulls, meet, trees, spheres,
                    points, mixed, rigid, touches, features,
-                   friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None, real),
+                   friction,
                    restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
-                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real))
+                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real), exact,
+                   rapid_of(bodies, numbering, found, contact, inverse_mass, belongs) if continuous else None)
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,
@@ -117,7 +127,7 @@ def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, togethe
     whole_ones = rigid_bodies(bodies, numbering)
     several = sum(len(index) for _, index in soft) > 1 or scene.effects.self_collision
     thick = any(body.shape.radius > 0 for body, _ in soft)
-    touch, mix = several and thick, bool(soft) and bool(whole_ones)
+    touch, mix = several and thick and scene.solver.deformable_contact == "spheres", bool(soft) and bool(whole_ones)
     if not touch and not mix:
         return None, None, None, None
     size = len(inverse_mass)
@@ -125,7 +135,7 @@ def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, togethe
     assert layered is not None
     wrapped = wrapped_hulls(bodies, numbering) if mix else None
     trees = Trees(layered, wrapped, stack_of(layered, wrapped), 1 if scene.effects.self_collision else None)
-    spheres = spheres_of(layered, LISTING_MARGIN * spacing_of(soft)) if touch else None
+    spheres = spheres_of(layered, LISTING_MARGIN * spacing_of(bodies)) if touch else None
     if not mix:
         return trees, spheres, None, None
     particles = np.concatenate([index.ravel() for _, index in soft])
@@ -137,14 +147,15 @@ def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, togethe
     mixed = Mixed(candidates_of(FIRST_ROOM), gate(np.zeros((3, size)), real), gate(hull, np.int64),
                   gate(np.zeros(count + 1), np.int64),
                   pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), meetings_of(FIRST_ROOM), narrow_of(points),
-                  LISTING_MARGIN * spacing_of(soft), near, 1)
+                  LISTING_MARGIN * spacing_of(bodies), near, 1)
     return trees, spheres, points, mixed
 
 
-def spacing_of(soft: list[tuple[Body, Integers]]) -> float:
+def spacing_of(bodies: list[Body]) -> float:
     """The shortest stick or the smallest diameter of deformable bodies that have any, m."""
-    lengths = [body.shape.lengths[body.shape.lengths > 0] for body, _ in soft]
-    sizes = [2 * body.shape.radius for body, _ in soft if body.shape.radius > 0]
+    soft = [body.shape for body in bodies if not body.shape.rigid]
+    lengths = [shape.lengths[shape.lengths > 0] for shape in soft]
+    sizes = [2 * shape.radius for shape in soft if shape.radius > 0]
     return float(min(np.concatenate([*lengths, sizes]), default=1.0))
 
 

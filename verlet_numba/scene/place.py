@@ -69,7 +69,8 @@ def build(entry: Entry, folder: Path, gravity: tuple[float, float, float] | None
             return shapes.icosahedron(entry.radius, mass=entry.mass, density=entry.density)
         case "particles":
             return shapes.particles(entry.positions, entry.masses, sticks=entry.sticks, angles=entry.angles,
-                                    radius=entry.radius, compliance=entry.compliance)
+                                    radius=entry.radius, compliance=entry.compliance,
+                                    segments=entry.contact_geometry == "segments")
         case "mesh":
             from verlet_numba.scene.mesh import mesh
 

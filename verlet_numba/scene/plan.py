@@ -49,7 +49,8 @@ def plan(prepared: Prepared, model: Model) -> dict[str, Any]:
 
 def bodies_meet(world: World) -> bool:
     """Whether any two bodies may touch."""
-    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed))
+    return any(effect is not None for effect in (world.effects.meet, world.effects.spheres, world.effects.mixed,
+                                                   world.effects.exact))
 
 
 def frame_count(scene: Scene) -> int:
@@ -94,7 +95,10 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield Phase("motion of colliders", active.moving is not None,
                 "a collider has a path or a spin" if active.moving else "no collider has a path or a spin")
     yield from contacts(prepared, model)
-    yield Phase("continuous collision", False, "not simulated yet")
+    asked = scene.effects.continuous_collision
+    yield Phase("continuous collision", active.rapid is not None or (asked and active.exact is not None),
+                "effects.continuous_collision" if active.rapid or active.exact else "effects.continuous_collision is off"
+                if not asked else "nothing that may meet something on its way")
     yield Phase("bending", active.bending is not None, unnamed if effects.bending is None else named if active.bending else
                 "named, but there is neither cloth nor a rope of two segments" if effects.bending.stiffness else nothing)
     yield Phase("orientation guard", active.orientation is not None,
@@ -145,12 +149,13 @@ def rigid_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phas
 
 def soft_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phase]:
     """Deformable bodies that meet. none: as above."""
-    scene, trees, spheres, mixed = (prepared.scene, model.world.effects.trees, model.world.effects.spheres,
-                                    model.world.effects.mixed)
+    scene, active = prepared.scene, model.world.effects
+    trees, spheres, mixed = active.trees, active.spheres, active.mixed
     soft = [body for body in prepared.bodies if not body.shape.rigid]
     count, rigid = sum(body.copies for body in soft), sum(body.copies for body in prepared.bodies if body.shape.rigid)
     absent = none or ("" if soft else "no deformable body")
-    thin = "" if any(body.shape.radius > 0 for body in soft) else "no deformable body has a thickness"
+    thin = ("solver.deformable_contact is exact" if scene.solver.deformable_contact == "exact" else
+            "" if any(body.shape.radius > 0 for body in soft) else "no deformable body has a thickness")
     particles = sum(body.copies * len(body.pinned) for body in soft)
     asked = scene.effects.self_collision
     single = "" if particles > 1 else "one particle"
@@ -160,6 +165,10 @@ def soft_contacts(prepared: Prepared, model: Model, none: str) -> Iterator[Phase
                 if spheres and count > 1 else absent or ("one deformable body" if count < 2 else thin))
     yield Phase("self-contact", spheres is not None and asked, "effects.self_collision" if spheres and asked
                 else absent or (thin or single if asked else "effects.self_collision is off"))
+    pairs, exact = "vertices with triangles, edges with edges", active.exact is not None
+    yield Phase("exact contact", exact, pairs if exact and scene.solver.deformable_contact == "exact" else
+                f"{pairs}, without thickness: effects.continuous_collision" if exact else absent or
+                ("it meets nothing" if scene.solver.deformable_contact == "exact" else "solver.deformable_contact is spheres"))
     yield Phase("deformable against rigid", mixed is not None, f"{particles} particles, {rigid} rigid bodies" if mixed
                 else absent or "no rigid body")
 

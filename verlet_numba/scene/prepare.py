@@ -8,9 +8,8 @@ from verlet_numba.scene.body import Body
 from verlet_numba.scene.doctor import examine
 from verlet_numba.scene.load import Loaded, load
 from verlet_numba.scene.place import place
-from verlet_numba.scene.problems import Problem, SceneError
+from verlet_numba.scene.problems import Problem
 from verlet_numba.scene.schema import Scene
-from verlet_numba.scene.support import unsupported
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +28,5 @@ class Prepared:
 def prepare(path: str | Path, sets: Sequence[str] = ()) -> Prepared:
     """Load, validate and place a scene. Raises SceneError with every problem, each at its line and column."""
     loaded = load(path, sets)
-    problems = unsupported(loaded)
-    if problems:
-        raise SceneError(problems)
     bodies = place(loaded.scene, loaded.folder, loaded.source)
     return Prepared(loaded, bodies, examine(loaded.scene, bodies, loaded.folder, loaded.source))

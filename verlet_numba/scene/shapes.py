@@ -59,7 +59,7 @@ def rope(start: ArrayLike, end: ArrayLike, segments: int, *, length: float | Non
     first = np.arange(segments)
     return Shape("rope", ("line",), positions, share_mass(segments + 1, mass, density, length),
                  np.stack([first, first + 1], axis=1), np.full(segments, length / segments), rigid=False,
-                 radius=thickness / 2, compliance=compliance, lines=(np.arange(segments + 1),))
+                 radius=thickness / 2, compliance=compliance, lines=(np.arange(segments + 1),), segments=True)
 
 
 def hanging_arc(start: Floats, end: Floats, length: float, segments: int, gravity: ArrayLike | None) -> Floats:
@@ -194,11 +194,12 @@ def _neighbour_triangles(points: Floats, side: float) -> Integers:
 
 
 def particles(positions: ArrayLike, masses: ArrayLike, *, sticks: Sequence[Sequence[float]] = (),
-              angles: Sequence[Sequence[float]] = (), radius: float = 0.0, compliance: float = 0.0) -> Shape:
+              angles: Sequence[Sequence[float]] = (), radius: float = 0.0, compliance: float = 0.0,
+              segments: bool = False) -> Shape:
     """Point masses (kg) at world coordinates (m).
 
     A stick [i, j] keeps the initial distance, [i, j, length] another (m). An angle [i, j, k] keeps the initial angle at
-    j, [i, j, k, degrees] another.
+    j, [i, j, k, degrees] another. segments: sticks collide as capsules.
     """
     points = np.asarray(positions, float).reshape(-1, 3)
     weights = np.asarray(masses, float)
@@ -213,7 +214,7 @@ def particles(positions: ArrayLike, masses: ArrayLike, *, sticks: Sequence[Seque
         if len(angle) == 4:
             values[row] = np.deg2rad(angle[3])
     return Shape("particles", ("points",), points, weights, pairs, lengths, rigid=False, radius=radius,
-                 compliance=compliance, angles=triples, angle_values=values, lines=tuple(pairs))
+                 compliance=compliance, angles=triples, angle_values=values, lines=tuple(pairs), segments=segments)
 
 
 def _angles_at_middle(points: Floats, triples: Integers) -> Floats:

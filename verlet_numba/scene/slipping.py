@@ -27,11 +27,23 @@ TOLERANCE = 1e-9            # relative: what rounding makes of a thickness that 
 
 def slipping(scene: Scene, bodies: list[Body]) -> Warnings:
     """All warnings of this page."""
-    yield from too_fast_for_colliders(scene, bodies)
-    yield from too_coarse(scene, bodies)
-    if len(bodies) <= MOST_BODIES:
-        yield from too_fast_for_bodies(scene, bodies)
-        yield from holes(scene, bodies)
+    exact = scene.solver.deformable_contact == "exact"
+    if not scene.effects.continuous_collision:
+        yield from too_fast_for_colliders(scene, bodies)
+        if len(bodies) <= MOST_BODIES:
+            yield from too_fast_for_bodies(scene, bodies)
+    if not exact:
+        yield from segments(bodies)
+        yield from too_coarse(scene, bodies)
+        if len(bodies) <= MOST_BODIES:
+            yield from holes(scene, bodies)
+
+
+def segments(bodies: list[Body]) -> Warnings:
+    """Sticks that shall collide, where only particles do."""
+    for index, body in enumerate(bodies):
+        if body.shape.segments and body.shape.kind == "particles":
+            yield ("bodies", index), "its segments meet nothing, only its particles do: set solver.deformable_contact to exact"
 
 
 def too_fast_for_colliders(scene: Scene, bodies: list[Body]) -> Warnings:
@@ -42,6 +54,8 @@ def too_fast_for_colliders(scene: Scene, bodies: list[Body]) -> Warnings:
     speeds = np.array([top_speed(body) for body in bodies])
     landing = landing_speeds(scene, bodies, speeds, np.stack([box_about(collider) for collider, *_ in thin]))
     for index, body in enumerate(bodies):
+        if exact_and_soft(scene, body):
+            continue
         own = width(body.shape)
         for number, (collider, thickness, own_speed) in enumerate(thin):
             limit = (thickness + own) / 2 if body.shape.rigid else thickness + own
@@ -62,18 +76,25 @@ def too_fast_for_bodies(scene: Scene, bodies: list[Body]) -> Warnings:
     speed, thickness = (np.array([of(body) for body in bodies]) for of in (top_speed, lambda body: width(body.shape)))
     reach, limit = (speed[:, None] + speed) / substeps_a_second(scene), (thickness[:, None] + thickness) / 2
     soft = np.array([not body.shape.rigid for body in bodies])
-    meet = (limit > 0) & (speed[:, None] >= speed) & (~np.eye(len(bodies), dtype=bool) | (_copies(bodies) > 1))
+    held = np.array([exact_and_soft(scene, body) for body in bodies])
+    meet = ~(held[:, None] | held) & (limit > 0)
+    meet &= (speed[:, None] >= speed) & (~np.eye(len(bodies), dtype=bool) | (_copies(bodies) > 1))
     meet &= ~(soft & (thickness == 0))[:, None] | ~soft         # points meet rigid bodies alone
     stays = np.array([body.pinned.any() or bool(scene.colliders) for body in bodies])
     boxes = np.stack([np.stack([body.positions.min(axis=(0, 1)), body.positions.max(axis=(0, 1))]) for body in bodies])
     landing = np.where(stays, landing_speeds(scene, bodies, speed, boxes), 0.0) / substeps_a_second(scene)
-    touch = (limit > 0) & (~(soft & (thickness == 0))[:, None] | ~soft)
+    touch = ~(held[:, None] | held) & (limit > 0) & (~(soft & (thickness == 0))[:, None] | ~soft)
     first, later = (np.where(some, far / np.where(limit > 0, limit, 1), 0.0) for some, far in ((meet, reach), (touch, landing)))
     for index, other in enumerate(np.maximum(first, later).argmax(axis=1)):
         falls = bool(later[index, other] > first[index, other])
         if max(first[index, other], later[index, other]) > 1:
             name = "another copy" if other == index else f"body {bodies[other].name}"
             yield ("bodies", index), _too_fast(scene, (landing if falls else reach)[index, other], limit[index, other], name, falls)
+
+
+def exact_and_soft(scene: Scene, body: Body) -> bool:
+    """Whether exact contact lets a body pass through nothing, however fast it is."""
+    return scene.solver.deformable_contact == "exact" and not body.shape.rigid
 
 
 def _too_fast(scene: Scene, reach: float, limit: float, other: str, falls: bool) -> str:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Candidates, Layered, Spheres, Stack, Wrapped, gate
+from verlet_numba.buffers import Candidates, Layered, Pieces, Spheres, Stack, Wrapped, gate
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.clearance import hull_clearance
 from verlet_numba.scene.hulls import hulls_of, surface_of
@@ -374,7 +374,7 @@ def node_support(tree: Tree, points: Floats, parts: Sequence[Integers]) -> Integ
     return smallest_spheres(points, members, first[rank], first[rank + below] - first[rank])[2]
 
 
-def stack_of(*forests: Layered | Wrapped | None) -> Stack:
+def stack_of(*forests: Layered | Wrapped | Pieces | None) -> Stack:
     """Room for any descent of two trees, or of one against itself: at most two pairs a level are left for later.
 
     Depths are at most 2 log2 of the number of leaves, so four times the bits of the number of nodes is enough.

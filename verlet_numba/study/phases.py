@@ -48,7 +48,7 @@ def phase_seconds(model: Model, count: int, seconds: float) -> tuple[dict[str, f
 def absent(model: Model) -> set[str]:
     """Phases that the model's world has no part for: what a clock tells of them is its own noise."""
     effects = model.world.effects
-    meets = any(each is not None for each in (effects.contact, effects.meet, effects.spheres, effects.mixed))
+    meets = any(each is not None for each in (effects.contact, effects.meet, effects.spheres, effects.mixed, effects.exact))
     there = {"rest": effects.rest, "gravity": effects.gravity, "wind": effects.wind, "drag": effects.drag,
              "damping": effects.damping, "paths": effects.carried or effects.moving}
     contacts = {"finding contacts", "weighing contacts", "answering contacts", "rebound and friction"}

@@ -17,9 +17,7 @@ from verlet_numba.scene.build import Model, build, frames
 from verlet_numba.scene.load import Loaded, loads
 from verlet_numba.scene.place import place
 from verlet_numba.scene.plan import bodies_meet, frame_count
-from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.schema import Reference
-from verlet_numba.scene.support import unsupported
 from verlet_numba.study.measures import numbers, parted, rest_time
 from verlet_numba.study.phases import phase_seconds
 
@@ -43,10 +41,7 @@ class Outcome:
 def under(loaded: Loaded, settings: Settings, sets: Sequence[str]) -> Loaded:
     """The scene under these settings. Raises SceneError for what the scene or the program does not allow."""
     overrides = [f"{path}={json.dumps(value)}" for path, value in {**settings, **IN_FULL}.items()]
-    found = loads(loaded.source.text, loaded.source.name, [*sets, *overrides])
-    if problems := unsupported(found):
-        raise SceneError(problems)
-    return found
+    return loads(loaded.source.text, loaded.source.name, [*sets, *overrides])
 
 
 class Trial:

@@ -9,7 +9,6 @@ import pytest
 
 from verlet_numba.scene.load import Loaded, json_schema, load, loads, resolved
 from verlet_numba.scene.problems import SceneError
-from verlet_numba.scene.support import NOT_BUILT, unsupported
 
 FULL = """\
 version: 1
@@ -165,38 +164,6 @@ def test_the_schema_for_editors_has_descriptions_and_defaults() -> None:
     assert schema["$defs"]["Solver"]["properties"]["substeps"]["default"] == 8
     assert "m/N" in schema["$defs"]["Rope"]["properties"]["compliance"]["description"]
     assert "from" in schema["$defs"]["Expect"]["properties"]
-
-
-def test_all_that_is_not_built_is_refused_where_it_stands() -> None:
-    text = FULL.replace("preset: default", "preset: paper").replace(
-        "contact_geometry: nodes", "contact_geometry: segments")
-    found = unsupported(loads(text, "s.yaml", ["effects.rest.time=1"]))
-    assert [problem.path.replace(".5", ".*") for problem in found] == [row.path for row in NOT_BUILT]
-    lines = text.splitlines()
-    for problem in found:
-        key = problem.path.split(".")[-1]
-        if problem.file == "s.yaml":
-            assert lines[problem.line - 1][problem.column - 1 :].startswith(f"{key}:")
-        assert key in problem.message
-
-
-def test_what_is_not_written_or_switched_off_is_no_matter() -> None:
-    assert unsupported(loads(SMALL, "s.yaml")) == []
-    off = ("effects: {self_collision: false, continuous_collision: false, bending: null}\n"
-           "solver: {preset: default, order: sequential, gradient: current, substeps: 2}\n")
-    assert unsupported(loads(SMALL + off, "s.yaml")) == []
-
-
-def test_an_override_that_is_not_built_is_refused_too() -> None:
-    problem, = unsupported(loads(SMALL, "s.yaml", ["effects.continuous_collision=true"]))
-    assert problem.file == "--set effects.continuous_collision=true"
-    assert problem.column == 9
-
-
-@pytest.mark.parametrize("order", ["lines", "constraint_graph"])
-def test_directions_at_the_start_are_for_the_plain_order(order: str) -> None:
-    with pytest.raises(SceneError, match="step_start is for order sequential"):
-        loads(SMALL + f"solver: {{gradient: step_start, order: {order}}}\n", "s.yaml")
 
 
 def test_loading_needs_no_heavy_library() -> None:
