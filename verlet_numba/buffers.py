@@ -27,6 +27,7 @@ RELAXED, TOUCHING, RELAXED_KEPT, FALLEN, FALLEN_KEPT = 0, 1, 2, 3, 4    # Snapsh
 FEATURE, BODY, PRINTED = 0, 1, 2                        # Features.point
 LOOSE, HUNG, RESTLESS, FIXED = 0, 1, 2, 3               # Rest.kind
 POINTS = 8                                              # contacts of a pair of hulls, at most
+OVERFLOWN = -2                                          # Listing.made: there was no room for the list
 NEARER = 0.5        # of their distance at rest: how near features of one deformable body may come (kernels/near_features.py)
 
 
@@ -624,7 +625,7 @@ class Listing(NamedTuple):
 
     stack: Stack
     pairs: Candidates           # of pieces
-    made: Array                 # (1,) int 1; pairs of features listed; -1: none yet
+    made: Array                 # (1,) int 1; pairs of features listed; -1: none yet, OVERFLOWN: there was no room
     point: Array                # (W, 4) int 1; a vertex and a triangle, or the ends of two edges
     edges: Array                # (W,) int 1; 1: two edges
     reach: Array                # (W,) double m; how near they may come
