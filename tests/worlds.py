@@ -77,10 +77,10 @@ PRECISE = {
         {"kind": "cloth", "name": "sheet", "size": [0.6, 0.5], "resolution": [4, 3], "mass": 0.2, "position": [0, 0, 0.35]},
         {"kind": "rope", "name": "line", "start": [-0.4, 0, 0.5], "end": [0.4, 0.1, 0.5], "segments": 6, "mass": 0.1,
          "thickness": 0.02},
-        {"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 0.5, "position": [0, 0, 0.7], "velocity": [0, 0, -2]}],
+        {"kind": "box", "name": "block", "size": [0.15, 0.15, 0.15], "mass": 0.5, "position": [0, 0, 0.7], "velocity": [0, 0, -2]}],
     "colliders": [{"kind": "plane"}, {"kind": "box", "size": [0.2, 0.2, 0.3], "position": [0, 0, 0.15]}],
     "output": {"precision": "float64"}}
-"""A cloth on a post, a rope and a die that fall on it: exact contact, and impacts along the step."""
+"""A cloth on a post, a rope and a block that fall on it: exact contact, and impacts along the step."""
 
 CHAINS = {
     "time": {"duration": 1, "frame_rate": 60},

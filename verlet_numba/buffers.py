@@ -676,7 +676,7 @@ class Listing(NamedTuple):
 
     stack: Stack
     pairs: Candidates           # of pieces
-    made: Array                 # (1,) int 1; pairs of features listed; -1: none yet
+    made: Array                 # (1,) int 1; pairs of features listed; -1: none yet, NO_ROOM: there was no room
     point: Array                # (W, 4) int 1; a vertex and a triangle, or the ends of two edges
     edges: Array                # (W,) int 1; 1: two edges
     reach: Array                # (W,) double m; how near they may come

@@ -10,6 +10,7 @@ pass is held back short of its impact. All this comes before contacts are sought
 import math
 
 from verlet_numba._jit import kernel
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.effects.exact import (
     begin_wholes,
     bound_gaps,
@@ -76,6 +77,7 @@ def find_impacts(rapid, listing, among):
     else:
         fits = list_against_others(rapid.pieces, listing.stack, listing.pairs)
     if not fits or not list_features(start, points, rapid.pieces, listing):
+        listing.made[0] = NO_ROOM
         return False
     listed = gaps.listed[0]
     for n in range(listing.made[0]):

@@ -24,6 +24,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import inlined, kernel
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.effects.contact import separate
 from verlet_numba.effects.friction import coefficients
 from verlet_numba.effects.touch import weigh_one
@@ -64,7 +65,7 @@ def spare(listing):
         return True
     if 2 * listing.made[0] <= listing.left.size and 2 * listing.pairs.listed[0] <= listing.pairs.first.size:
         return True
-    listing.made[0] = -1
+    listing.made[0] = NO_ROOM
     return False
 
 
@@ -149,6 +150,7 @@ def find_again(exact, listing, among):
         exact.tally[0] += 1
         if not (list_pieces(points.start, exact.pieces, exact.itself, listing, among)
                 and list_features(points.start, points, exact.pieces, listing)):
+            listing.made[0] = NO_ROOM
             return False
     return find_gaps(points, listing, exact.gaps, exact.continuous)
 

@@ -9,6 +9,7 @@ from verlet_numba.buffers import (
     BOX,
     CYLINDER,
     NEARER,
+    NO_ROOM,
     SPHERE,
     Contacts,
     Exact,
@@ -188,10 +189,8 @@ def roomier_exact(exact: Exact | None) -> Exact | None:
     if exact is None:
         return None
     size, among, against = len(exact.points.free), exact.among, exact.against
-    if (among is None or among.made[0] >= 0) and (against is None or against.made[0] >= 0):
-        return exact._replace(gaps=gaps_of(2 * len(exact.gaps.gap)))
-    if among is not None and among.made[0] < 0:
-        among = listing_of(exact.pieces, size, 2 * len(among.left))
-    if against is not None and against.made[0] < 0:
-        against = listing_of(exact.pieces, size, 2 * len(against.left))
-    return exact._replace(among=among, against=against)
+    if among is not None and among.made[0] == NO_ROOM:
+        return exact._replace(among=listing_of(exact.pieces, size, 2 * len(among.left)))
+    if against is not None and against.made[0] == NO_ROOM:
+        return exact._replace(against=listing_of(exact.pieces, size, 2 * len(against.left)))
+    return exact._replace(gaps=gaps_of(2 * len(exact.gaps.gap)))

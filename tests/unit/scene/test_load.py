@@ -1,4 +1,4 @@
-"""Scene files as a whole: everything that is wrong is told at once, where it stands; what is not built is refused."""
+"""Scene files as a whole: everything that is wrong is told at once, where it stands."""
 
 import json
 import subprocess
