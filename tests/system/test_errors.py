@@ -79,7 +79,8 @@ def test_wrong_overrides(verlet, write_scene, override, column, words):
 def test_what_is_built_is_not_refused(verlet, write_scene):
     sets = [word for key in DONE for word in ("--set", f"solver.{key}")]
     verlet("check", write_scene(bodies=[PENDULUM]), *sets, "--set", "effects.self_collision=true", code=0)
-    verlet("check", write_scene(bodies=[PENDULUM]), "--set", "solver.gradient=step_start", "--set", "effects.bending={stiffness: 0.5}",
+    verlet("check", write_scene(bodies=[PENDULUM]), "--set", "solver.gradient=step_start",
+           "--set", "effects.bending={stiffness: 0.5}",
            "--set", "solver.deformable_contact=exact", "--set", "effects.continuous_collision=true",
            "--set", "bodies.0.contact_geometry=segments", code=0)
 

@@ -1,16 +1,19 @@
 """The seam between sweeps and the simulation: a group of runs of equal topology and solver settings is advanced here.
 
-The planner promises that the scenes of a group differ in decimal numbers and the seed alone (`planning.group_of`), so they can
-be laid side by side as one simulation. At present they are simulated one after the other and share compiled code and the blank
-of their files. Whoever simulates them together changes `advance_group` and nothing else: it may begin all of its runs at once,
-and hands each over when it ends.
+The planner promises that the scenes of a group differ in decimal numbers and the seed alone (`planning.group_of`). Those that
+may be are simulated side by side, as the instances of one world (run/ensemble.py); a run that has to be alone has checkpoints,
+and goes on where a killed worker left it. Both write the same files.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from verlet_numba.run.ensemble import Instance, blocks, model_alone, simulate_block
+from verlet_numba.run.resume import ResumeError
+from verlet_numba.run.signals import StopSignals
 from verlet_numba.run.simulate import Summary, simulate
+from verlet_numba.run.summary import STOPPED
 from verlet_numba.scene.load import Loaded
 from verlet_numba.scene.place import place
 from verlet_numba.scene.prepare import Prepared
@@ -29,20 +32,48 @@ class Job:
 def advance_group(jobs: Sequence[Job], begin: Callable[[str], None]) -> Iterator[tuple[Job, Summary | Exception]]:
     """Simulate every job to its end: yields each with its summary, or with what it raised, as soon as it has ended.
 
-    `begin(id)` is called before anything is done for a job: if this process dies, those begun and not yielded are to blame.
-    A trajectory that is there already is redone from its start. A job that fails takes no other with it. After a signal the
-    summary at hand says so, and no more jobs are begun.
+    `begin(id)` is called before anything is simulated of a job: if this process dies, those begun and not yielded are to
+    blame. A job that fails takes no other with it. After a signal the summaries at hand say so, and no more jobs are begun.
     """
-    for job in jobs:
-        begin(job.id)
+    instances = []
+    for number, job in enumerate(jobs):
         try:
-            summary = simulate(prepared(job.loaded), job.output, command=job.command, overwrite=True, threads=1, quiet=True)
+            ready = prepared(job.loaded)
+            instances.append(Instance(number, ready, job.output, job.command, model_alone(ready)))
         except Exception as error:      # whatever is wrong with one run is that run's failure
             yield job, error
-        else:
-            yield job, summary
-            if summary.signal is not None:
-                return
+    for block in blocks(instances):
+        for member in block:
+            begin(jobs[member.number].id)
+        outcomes = [alone(block[0])] if len(block) == 1 else together(block)
+        yield from ((jobs[member.number], outcome) for member, outcome in zip(block, outcomes, strict=True))
+        if any(isinstance(outcome, Summary) and outcome.signal is not None for outcome in outcomes):
+            return
+
+
+def together(block: list[Instance]) -> list[Summary | Exception]:
+    """Simulate the instances of one world, from their start."""
+    with StopSignals() as signals:
+        try:
+            simulate_block(block, signals.stop, overwrite=True)
+        except Exception as error:
+            return [member.failure or error for member in block]
+    for member in block:
+        if member.summary.status == STOPPED:
+            member.summary.signal = signals.number
+    return [member.failure or member.summary for member in block]
+
+
+def alone(instance: Instance) -> Summary | Exception:
+    """Simulate a run by itself, from where a worker before left it if there is such a place."""
+    ready, output, command = instance.prepared, instance.output, instance.command
+    try:
+        try:
+            return simulate(ready, output, command=command, resume=True, threads=1, quiet=True)
+        except ResumeError:             # the program has changed since
+            return simulate(ready, output, command=command, overwrite=True, threads=1, quiet=True)
+    except Exception as error:
+        return error
 
 
 def prepared(loaded: Loaded) -> Prepared:

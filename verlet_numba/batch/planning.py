@@ -103,7 +103,7 @@ def laid(document: Document, point: Sequence[Choice]) -> Source:
 def scene_at(document: Document, point: Sequence[Choice]) -> Loaded:
     """The scene of a point. Raises SceneError."""
     loaded = validate(laid(document, point))
-    problems = unreadable(loaded)
+    problems = list(unreadable(loaded))
     if problems:
         raise SceneError(problems)
     return loaded
