@@ -32,7 +32,7 @@ from verlet_numba.scene.sphere_trees import candidates_of, spacing, stack_of
 LEAST_RADIUS = 1e-3     # of the deformable bodies' spacing: what has no thickness is still met from a distance
 FLOOR = 0.02            # of it: the step that is allowed for even where nothing moves
 RAPID = 0.25            # of the least thickness of rigid bodies and colliders: what goes farther in a substep is followed
-SHORT = 1e-3            # of that: how far from each other rigid bodies are stopped
+SHORT = 0.1             # of that: how far from each other rigid bodies are stopped, as they turn meanwhile
 SIZES = {BOX: 3, SPHERE: 1, CYLINDER: 2}        # how many entries of their extent are half of a thickness
 
 
