@@ -22,8 +22,6 @@ from verlet_numba.scene.build import build, frames
 from verlet_numba.scene.load import Loaded, loads
 from verlet_numba.scene.place import place
 from verlet_numba.scene.plan import frame_count
-from verlet_numba.scene.problems import SceneError
-from verlet_numba.scene.support import unsupported
 
 SCENES = Path(__file__).parent.parent / "scenes"
 IN_FULL = {"output.precision": "float64", "output.fields": ["velocity"],
@@ -78,7 +76,4 @@ def load(scene: str | Mapping[str, Any] | Path, overrides: Mapping[str, Any]) ->
         text = path.read_text(encoding="utf-8")
     else:
         text = scene if isinstance(scene, str) else json.dumps(scene)
-    loaded = loads(text, str(path), [f"{key}={json.dumps(value)}" for key, value in overrides.items()])
-    if problems := unsupported(loaded):
-        raise SceneError(problems)
-    return loaded
+    return loads(text, str(path), [f"{key}={json.dumps(value)}" for key, value in overrides.items()])

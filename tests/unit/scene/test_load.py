@@ -167,7 +167,7 @@ def test_the_schema_for_editors_has_descriptions_and_defaults() -> None:
 
 
 def test_loading_needs_no_heavy_library() -> None:
-    code = ("import sys, verlet_numba.scene.support as _\n"
+    code = ("import sys, verlet_numba.scene.load as _\n"
             "heavy = {'numba', 'numpy', 'scipy', 'trimesh', 'matplotlib'}\n"
             "print(sorted(heavy & set(sys.modules)))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
