@@ -104,14 +104,16 @@ def outcome(path: Path, sets: list[str]) -> bool:
     try:
         load(path, sets)
     except SceneError as error:
-        assert error.problems
-        for problem in error.problems:
-            assert problem.line >= 1
-            assert problem.column >= 1
-            assert problem.message
-            assert "\n" not in str(problem)
-        return False
-    return True
+        problems = error.problems
+    else:
+        return True
+    assert problems
+    for problem in problems:
+        assert problem.line >= 1
+        assert problem.column >= 1
+        assert problem.message
+        assert "\n" not in str(problem)
+    return False
 
 
 @pytest.mark.parametrize("seed", range(8))
