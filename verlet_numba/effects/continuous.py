@@ -84,7 +84,8 @@ def find_impacts(rapid, listing, among):
         a, b, c, d, two = listing.point[n, 0], listing.point[n, 1], listing.point[n, 2], listing.point[n, 3], listing.edges[n]
         if of_pair(step, a, b, c, d, two) <= rapid.least:
             continue
-        reach = listing.reach[n] + rapid.floor
+        far = apart_at(0.0, start, now, a, b, c, d, two)[7]
+        reach = min(listing.reach[n] + rapid.floor, 0.5 * far)         # what is as near as that already may halve it
         t = time_of_impact(start, now, a, b, c, d, two, reach)
         if t == NEVER or t == 0.0:
             continue
@@ -94,8 +95,7 @@ def find_impacts(rapid, listing, among):
         gaps.point[listed, 0], gaps.point[listed, 1], gaps.point[listed, 2], gaps.point[listed, 3] = a, b, c, d
         gaps.weight[listed, 0], gaps.weight[listed, 1], gaps.weight[listed, 2], gaps.weight[listed, 3] = p, q, r, s
         gaps.normal[listed, 0], gaps.normal[listed, 1], gaps.normal[listed, 2] = x / distance, y / distance, z / distance
-        gaps.gap[listed], gaps.reach[listed], gaps.edges[listed], gaps.push[listed] = (
-            apart_at(0.0, start, now, a, b, c, d, two)[7], reach, two, 0.0)
+        gaps.gap[listed], gaps.reach[listed], gaps.edges[listed], gaps.push[listed] = far, reach, two, 0.0
         listed += 1
     gaps.listed[0] = listed
     return True

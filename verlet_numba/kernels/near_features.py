@@ -27,6 +27,8 @@ def list_features(place, points, pieces, listing):
     for n in range(listing.pairs.listed[0]):
         for turn in range(2):
             e, f = (two[n], one[n]) if turn else (one[n], two[n])
+            if turn and e == f:
+                continue
             k, faces = node[f], triangles[f + 1] - triangles[f]
             for v in range(vertices[e], vertices[e + 1] if faces else vertices[e]):
                 a = vertex[v]
@@ -46,7 +48,7 @@ def list_features(place, points, pieces, listing):
                 own = max(slack[a], slack[b])
                 if (a == b and faces) or outside(place, a, b, radius[a] + own, box, k):
                     continue
-                for t in range(edges[f], edges[f + 1]):
+                for t in range(s + 1 if e == f else edges[f], edges[f + 1]):
                     c, d = edge[0, t], edge[1, t]
                     far = radius[a] + radius[d] + own + max(slack[c], slack[d])
                     if not (c == d and single) and not edges_beyond(place, a, b, c, d, far):

@@ -106,9 +106,15 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
         height -= 1
         k, l = first[height], second[height]
         if k == l:
-            if piece[k] >= 0 or (flat and unfolded(
+            if (piece[k] >= 0 and not flat) or (flat and unfolded(
                     bound[k, 0], bound[k, 1], bound[k, 2], bound[k, 3], bound[k, 4], bound[k, 5], bound[k, 6], bound[k, 7],
                     bound[k, 8], bound[k, 9], bound[k, 10], bound[k, 11], a, b, (reach + 2.0 * slack[k]) * SLACK / closest)):
+                continue
+            if piece[k] >= 0:               # a cell that folds on itself
+                if listed == one.size:
+                    return -1
+                one[listed], two[listed] = piece[k], piece[k]
+                listed += 1
                 continue
             c, d = k + 1, skip[k + 1]
             first[height], second[height] = c, c

@@ -55,7 +55,7 @@ class Case:
         return (places[:, moving] * mass).sum(axis=1)
 
     def features(self):
-        """All pairs of features of two pieces that may meet: (a, b, c, d, edges)."""
+        """All pairs of features that may meet: (a, b, c, d, edges)."""
         pieces = self.exact.pieces
         trees = [np.arange(pieces.root[t], pieces.root[t + 1]) for t in range(len(pieces.root) - 1)]
         owned = [pieces.piece[nodes][pieces.piece[nodes] >= 0] for nodes in trees]
@@ -71,7 +71,7 @@ class Case:
                 pairs = [(a, b, 0) for a in v for b in g] + [(a, b, 0) for a in w for b in f if u > t]
                 pairs += [(a, b, 1) for i, a in enumerate(d) for b in (e if u > t else e[i + 1:])
                           if not (a[1] == a[2] and g) and not (b[1] == b[2] and f)]
-                yield from ((*a[1:], *b[1:], edges) for a, b, edges in pairs if a[0] != b[0])
+                yield from ((*a[1:], *b[1:], edges) for a, b, edges in pairs)
 
 
 @pytest.mark.parametrize("name", SCENES)
