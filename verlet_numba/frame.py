@@ -111,6 +111,7 @@ def advance(world, frames, budget):
                 clock[STAGE] = INTEGRATED
             if clock[STAGE] == INTEGRATED:
                 if not arrest(position, previous, inverse_mass, contact, rapid):
+                    drop(stopwatch)
                     return FULL
                 move_hulls(hulls, contact, moving)
                 gather(position, hulls)

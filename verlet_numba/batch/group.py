@@ -14,6 +14,7 @@ from verlet_numba.run.resume import ResumeError
 from verlet_numba.run.signals import StopSignals
 from verlet_numba.run.simulate import Summary, simulate
 from verlet_numba.run.summary import STOPPED
+from verlet_numba.run.trajectory import DifferenceError
 from verlet_numba.scene.load import Loaded
 from verlet_numba.scene.place import place
 from verlet_numba.scene.prepare import Prepared
@@ -32,19 +33,18 @@ class Job:
 def advance_group(jobs: Sequence[Job], begin: Callable[[str], None]) -> Iterator[tuple[Job, Summary | Exception]]:
     """Simulate every job to its end: yields each with its summary, or with what it raised, as soon as it has ended.
 
-    `begin(id)` is called before anything is simulated of a job: if this process dies, those begun and not yielded are to
-    blame. A job that fails takes no other with it. After a signal the summaries at hand say so, and no more jobs are begun.
+    `begin(id)` is called before anything is done for a job: if this process dies, those begun and not yielded are to blame.
+    A job that fails takes no other with it. After a signal the summaries at hand say so, and no more are simulated.
     """
     instances = []
     for number, job in enumerate(jobs):
+        begin(job.id)
         try:
             ready = prepared(job.loaded)
             instances.append(Instance(number, ready, job.output, job.command, model_alone(ready)))
         except Exception as error:      # whatever is wrong with one run is that run's failure
             yield job, error
     for block in blocks(instances):
-        for member in block:
-            begin(jobs[member.number].id)
         outcomes = [alone(block[0])] if len(block) == 1 else together(block)
         yield from ((jobs[member.number], outcome) for member, outcome in zip(block, outcomes, strict=True))
         if any(isinstance(outcome, Summary) and outcome.signal is not None for outcome in outcomes):
@@ -52,12 +52,12 @@ def advance_group(jobs: Sequence[Job], begin: Callable[[str], None]) -> Iterator
 
 
 def together(block: list[Instance]) -> list[Summary | Exception]:
-    """Simulate the instances of one world, from their start."""
+    """Simulate the instances of one world, from their start; one by one if anything goes wrong with all of them."""
     with StopSignals() as signals:
         try:
             simulate_block(block, signals.stop, overwrite=True)
-        except Exception as error:
-            return [member.failure or error for member in block]
+        except Exception:
+            return [alone(member) for member in block]
     for member in block:
         if member.summary.status == STOPPED:
             member.summary.signal = signals.number
@@ -70,7 +70,7 @@ def alone(instance: Instance) -> Summary | Exception:
     try:
         try:
             return simulate(ready, output, command=command, resume=True, threads=1, quiet=True)
-        except ResumeError:             # the program has changed since
+        except (ResumeError, DifferenceError):          # the program has changed since
             return simulate(ready, output, command=command, overwrite=True, threads=1, quiet=True)
     except Exception as error:
         return error

@@ -50,7 +50,8 @@ class Plan:
 
     def overrides(self, run: Run) -> tuple[str, ...]:
         """What makes the scene this run's, as `--set` takes it."""
-        return tuple(f"{path}={json.dumps(value)}" for path, value in zip(self.parameters, run.values, strict=True))
+        return tuple(f"{path}={json.dumps(value, ensure_ascii=False)}"
+                     for path, value in zip(self.parameters, run.values, strict=True))
 
     def as_dict(self) -> dict[str, Any]:
         """What is kept in the sweep's folder."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import verlet_numba
 from verlet_numba.scene.load import validate
 from verlet_numba.scene.overrides import override
+from verlet_numba.scene.problems import SceneError
 from verlet_numba.scene.source import Source, compose
 from verlet_numba.study import figures, reader
 from verlet_numba.study.sweep_folder import FAILED, LASTING, RESULT, TRAJECTORY, Result, read_result, run_folder, write_result
@@ -111,8 +112,10 @@ def job_of(batch: Batch, run: Named) -> "Job":
     (place / RESULT).unlink(missing_ok=True)
     sets = (*batch.sets, *run.overrides)
     words = ["verlet-numba", "run", batch.scene_name, *(word for text in sets for word in ("--set", text))]
-    loaded = validate(override(document(batch.scene_text, batch.scene_name), sets)[0])
-    return Job(run.id, loaded, place / TRAJECTORY, shlex.join(words))
+    source, problems = override(document(batch.scene_text, batch.scene_name), sets)
+    if problems:
+        raise SceneError(problems)
+    return Job(run.id, validate(source), place / TRAJECTORY, shlex.join(words))
 
 
 @lru_cache(1)

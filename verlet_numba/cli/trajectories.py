@@ -71,7 +71,8 @@ def analyze_sweeps(folders: tuple[Path, ...], names: tuple[str, ...], body: str 
     found = [sweep_folder.table(folder) for folder in folders]
     if names or body or recompute:
         try:
-            found = [sweep_folder.measured(each, names or each.columns, body, not recompute) for each in found]
+            found = [sweep_folder.measured(each, names or sweep_folder.read_plan(each.folder)["measures"], body, not recompute)
+                     for each in found]
         except MeasureError as error:
             raise Misuse(str(error)) from error
     if csv_file is not None:
@@ -153,10 +154,10 @@ def view(trajectory: Path, output: Path, frames: str | None, budget: float, over
 @QUIET
 def export(trajectory: Path, output: Path, frames: str | None, overwrite: bool, quiet: bool) -> None:
     """Write TRAJECTORY, or frames of it, in another format: USD, PC2, or a sequence of OBJ or PLY files."""
-    refuse_existing(output, overwrite)
-    from verlet_numba.study.export import ExportError
+    from verlet_numba.study.export import SEQUENCES, ExportError
     from verlet_numba.study.export import export as write
 
+    refuse_existing(output, overwrite or output.suffix.lower() in SEQUENCES)
     try:
         written = write(trajectory, output, chosen(frames), overwrite)
     except ExportError as error:

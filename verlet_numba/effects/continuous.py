@@ -20,6 +20,7 @@ from verlet_numba.effects.exact import (
     hold_back,
     shove_whole,
     take_back,
+    tell_short,
 )
 from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.kernels.near_features import list_features, of_pair
@@ -41,7 +42,7 @@ def arrest(position, previous, inverse_mass, contact, rapid):
         return True
     rapid.gaps.listed[0] = 0
     if not find_impacts(rapid, rapid.among, 1) or not find_impacts(rapid, rapid.against, 0):
-        return False
+        return tell_short(rapid)
     if rapid.gaps.listed[0] > 0:
         answer(position, previous, inverse_mass, rapid)
     return True

@@ -52,10 +52,26 @@ def find_exact(position, previous, contact, exact):
     mean_step(points, exact.among, exact.drift)
     gaps.listed[0] = 0
     if not find_against(exact, exact.against):
-        return False
+        return tell_short(exact)
     choose_frame(gaps.listed[0] > 0, exact.drift, exact.frame, exact.least)
     fits = find_among(exact, exact.among) and 2 * gaps.listed[0] <= gaps.gap.size
-    return spare(exact.among) and spare(exact.against) and fits
+    return (spare(exact.among) and spare(exact.against) and fits) or tell_short(exact)
+
+
+@kernel
+def tell_short(exact):
+    """False, and the gaps say that they had no room unless a list of pairs does."""
+    if not (is_short(exact.among) or is_short(exact.against)):
+        exact.gaps.listed[0] = NO_ROOM
+    return False
+
+
+@kernel
+def is_short(listing):
+    """Whether a list of pairs had no room."""
+    if listing is None:
+        return False
+    return listing.made[0] == NO_ROOM
 
 
 @kernel
@@ -235,21 +251,23 @@ def open_gap(position, previous, inverse_mass, points, wholes, gaps, g, push, x,
     a, b, c, d = gaps.point[g, 0], gaps.point[g, 1], gaps.point[g, 2], gaps.point[g, 3]
     p, q, r, s = gaps.weight[g, 0], gaps.weight[g, 1], gaps.weight[g, 2], gaps.weight[g, 3]
     nx, ny, nz = gaps.normal[g, 0], gaps.normal[g, 1], gaps.normal[g, 2]
-    give = p * p * free[a] + q * q * free[b] + r * r * free[c] + s * s * free[d]
-    give += give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz)
+    soft = p * p * free[a] + q * q * free[b] + r * r * free[c] + s * s * free[d]
+    give = soft + give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz)
     if not give > 0.0:
         return
     standing = min(push, max(0.0, reach - gap))
     fresh = push - standing
     gaps.push[g] = fresh
-    fx, fy, fz = push * nx, push * ny, push * nz
     sx = x - (p * start[a, 0] + q * start[b, 0] + r * start[c, 0] + s * start[d, 0])
     sy = y - (p * start[a, 1] + q * start[b, 1] + r * start[c, 1] + s * start[d, 1])
     sz = z - (p * start[a, 2] + q * start[b, 2] + r * start[c, 2] + s * start[d, 2])
-    share = grip(points.friction, a, d, sx, sy, sz, nx, ny, nz, fresh)
     along = sx * nx + sy * ny + sz * nz
-    fx, fy, fz = fx - share * (sx - along * nx), fy - share * (sy - along * ny), fz - share * (sz - along * nz)
-    fx, fy, fz = fx / give, fy / give, fz / give
+    sx, sy, sz = sx - along * nx, sy - along * ny, sz - along * nz
+    slide, across = math.sqrt(sx * sx + sy * sy + sz * sz), give        # a body that also turns gives way more along the slide
+    if slide > 0.0:
+        across = soft + give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, sx / slide, sy / slide, sz / slide)
+    share = grip(points.friction, a, d, slide, fresh * across / give) / across
+    fx, fy, fz = push * nx / give - share * sx, push * ny / give - share * sy, push * nz / give - share * sz
     standing /= give
     tx, ty, tz = standing * nx, standing * ny, standing * nz
     shove_point(now, points.shift, a, p * free[a], fx, fy, fz, tx, ty, tz)
@@ -271,13 +289,10 @@ def shove_point(now, shift, k, by, fx, fy, fz, tx, ty, tz):
 
 
 @kernel
-def grip(friction, a, d, sx, sy, sz, nx, ny, nz, push):
-    """Which part of the slide across the normal friction takes back."""
+def grip(friction, a, d, slide, push):
+    """Which part of the slide across the normal friction takes back; push: what the same impulse would move across [m]."""
     if friction is None:
         return 0.0
-    along = sx * nx + sy * ny + sz * nz
-    sx, sy, sz = sx - along * nx, sy - along * ny, sz - along * nz
-    slide = math.sqrt(sx * sx + sy * sy + sz * sz)
     if slide == 0.0:
         return 0.0
     static, dynamic = coefficients(friction, friction, a, d)
@@ -286,7 +301,7 @@ def grip(friction, a, d, sx, sy, sz, nx, ny, nz, push):
 
 @kernel
 def give_of_whole(position, previous, inverse_mass, points, wholes, gaps, g, nx, ny, nz):
-    """How rigid bodies give way to a unit impulse along the normal of a gap: 1/M + (r x n) . I^-1 (r x n), of both sides."""
+    """How rigid bodies give way to an impulse along the unit vector n at a gap: 1/M + (r x n) . I^-1 (r x n), of both sides."""
     if wholes is None:
         return 0.0
     give, m = 0.0, wholes.mass

@@ -149,6 +149,11 @@ def newest(trajectory: Path, frames: int) -> Checkpoint | None:
     return next((each for each in found if each is not None and each.frames <= frames), None)
 
 
+def there(trajectory: Path) -> int:
+    """Bytes that its checkpoints take on the disk."""
+    return sum(path.stat().st_size for path in names(trajectory) if path.exists())
+
+
 def remove(trajectory: Path) -> None:
     """There is nothing to go on with any more."""
     for path in names(trajectory):

@@ -17,10 +17,12 @@ import numpy as np
 
 from verlet_numba.buffers import COLUMNS, FRAME, Array, Frames
 from verlet_numba.frame import DIVERGED, OK
+from verlet_numba.run import checkpoint
 from verlet_numba.run.contents import contents, now
 from verlet_numba.run.engine import State, run_chunk, start, warm
+from verlet_numba.run.lock import Lock
 from verlet_numba.run.postmortem import Divergence, examine
-from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, store
+from verlet_numba.run.simulate import BROKEN, COMPLETE, STOPPED, Summary, remove_leftovers, store
 from verlet_numba.run.trajectory import TrajectoryFile
 from verlet_numba.scene.build import Model, build, frames
 from verlet_numba.scene.capacity import CrowdedError
@@ -89,6 +91,9 @@ def simulate_block(members: list[Instance], stop: Callable[[], bool], overwrite:
     with ExitStack() as stack:
         for member in members:
             with guarded(member):
+                stack.enter_context(Lock(member.output))
+                remove_leftovers(member.output)
+                checkpoint.remove(member.output)
                 member.file = stack.enter_context(TrajectoryFile(
                     member.output, contents(member.prepared, member.model, member.command), member.total, overwrite))
         try:
@@ -96,10 +101,10 @@ def simulate_block(members: list[Instance], stop: Callable[[], bool], overwrite:
         except CrowdedError as error:
             for member in members:
                 member.failure = member.failure or error
-        for member in members:
+        for member in sorted(members, key=lambda member: member.summary.status == BROKEN):      # the sound ones first
             if member.failure is None:
                 with guarded(member):
-                    finish(member)
+                    finish(member, stop)
     return members
 
 
@@ -143,7 +148,7 @@ def guarded(member: Instance) -> Iterator[None]:
     clock = time.perf_counter()
     try:
         yield
-    except OSError as error:
+    except Exception as error:      # whatever is wrong with one instance is its own failure
         member.failure = error
     spend([member], "write", time.perf_counter() - clock)
 
@@ -165,10 +170,10 @@ def hand_over(member: Instance, chunk: Frames) -> None:
         member.summary.status = BROKEN
 
 
-def finish(member: Instance) -> None:
-    """Complete the file, and find out where a divergence was."""
+def finish(member: Instance, stop: Callable[[], bool]) -> None:
+    """Complete the file, and find out where a divergence was, unless there is no time for that."""
     assert member.file is not None
-    if member.summary.status == BROKEN:
+    if member.summary.status == BROKEN and not stop():
         member.summary.divergence = broken_at(member.prepared, member.summary.frames)
     member.file.finish(member.summary.status, now(), member.summary.timing())
 

@@ -49,7 +49,10 @@ class Lock:
 
     def _open(self) -> int:
         try:
-            descriptor = os.open(self.file, os.O_RDWR | os.O_CREAT, 0o666)
+            try:
+                descriptor = os.open(self.file, os.O_RDWR | os.O_CREAT, 0o666)
+            except PermissionError:                 # another user's, left by a kill: it may be locked all the same
+                descriptor = os.open(self.file, os.O_RDONLY)
         except OSError as failure:
             raise OSError(failure.errno, failure.strerror, str(self.path.parent)) from failure
         try:

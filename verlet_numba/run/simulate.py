@@ -116,7 +116,8 @@ class Run:
     def bytes_to_write(self) -> int:
         """What this process may still add to the disk, at most."""
         there = self.output.stat().st_size if self.found is not None else 0
-        return max(0, file_bytes(self.prepared, self.model, self.total) - there) + CHECKPOINTS * checkpoint.size(self.model.world)
+        return max(0, file_bytes(self.prepared, self.model, self.total) - there) + max(
+            0, CHECKPOINTS * checkpoint.size(self.model.world) - checkpoint.there(self.output))
 
     def tell_where(self) -> None:
         if self.summary.resumed_at:

@@ -12,6 +12,7 @@ from verlet_numba.buffers import (
     Beside,
     Contacts,
     Effects,
+    Exact,
     Hulls,
     Manifold,
     Meet,
@@ -91,11 +92,9 @@ def roomier(effects: Effects) -> Effects:
 
     Raises CrowdedError where that would take more pairs than are listed at most.
     """
-    lists = effects.contact, effects.meet, effects.spheres, effects.mixed
     effects = effects._replace(contact=_roomier_contacts(effects.contact), meet=_roomier_meet(effects.meet),
-                               spheres=_roomier_spheres(effects.spheres), mixed=_roomier_mixed(effects.mixed))
-    if all(one is other for one, other in zip(lists, (effects.contact, effects.meet, effects.spheres, effects.mixed), strict=True)):
-        effects = effects._replace(exact=roomier_exact(effects.exact), rapid=roomier_exact(effects.rapid))
+                               spheres=_roomier_spheres(effects.spheres), mixed=_roomier_mixed(effects.mixed),
+                               exact=_roomier_exact(effects.exact), rapid=_roomier_exact(effects.rapid))
     contact, meet, mixed, rigid, restitution = effects.contact, effects.meet, effects.mixed, effects.rigid, effects.restitution
     if contact is not None and restitution is not None and restitution.rebound.size < contact.particle.size:
         effects = effects._replace(restitution=restitution._replace(rebound=real(contact.particle.size)))
@@ -156,6 +155,17 @@ def _roomier_mixed(mixed: Mixed | None) -> Mixed | None:
     if _lacks_room(mixed.meetings.listed):
         mixed = mixed._replace(meetings=meetings_of(2 * mixed.meetings.pair.size))
     return mixed
+
+
+def _roomier_exact(exact: Exact | None) -> Exact | None:
+    if exact is None:
+        return None
+    points, lists = len(exact.points.free), [each.left for each in (exact.among, exact.against) if each is not None]
+    longest = max(map(len, [exact.gaps.gap, *lists]))
+    if longest > MOST_PAIRS + PAIRS_A_PARTICLE * points:
+        raise CrowdedError(f"more than {longest:,} pairs of features about {points:,} points are near each other: what they belong "
+                           "to stands in each other or has burst; use more substeps or more room")
+    return roomier_exact(exact)
 
 
 def copied(pairs: Pairs, capacity: int) -> Pairs:

@@ -185,7 +185,7 @@ def gaps_of(room: int) -> Gaps:
 
 
 def roomier_exact(exact: Exact | None) -> Exact | None:
-    """Room for twice as much of what was full: a list that could not be made, or else the gaps."""
+    """Room for twice as much of what had too little: a list of pairs, or the gaps."""
     if exact is None:
         return None
     size, among, against = len(exact.points.free), exact.among, exact.against
@@ -193,4 +193,6 @@ def roomier_exact(exact: Exact | None) -> Exact | None:
         return exact._replace(among=listing_of(exact.pieces, size, 2 * len(among.left)))
     if against is not None and against.made[0] == NO_ROOM:
         return exact._replace(against=listing_of(exact.pieces, size, 2 * len(against.left)))
-    return exact._replace(gaps=gaps_of(2 * len(exact.gaps.gap)))
+    if exact.gaps.listed[0] == NO_ROOM:
+        return exact._replace(gaps=gaps_of(2 * len(exact.gaps.gap)))
+    return exact

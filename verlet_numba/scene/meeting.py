@@ -98,12 +98,13 @@ def contact_of(scene: Scene, folder: Path, bodies: list[Body], numbering: Number
     friction = friction_of(scene, found, bodies, numbering, size, hulls, points, spheres is not None or precise, real)
     exact = exact_of(bodies, numbering, found, contact, together, inverse_mass, belongs, friction, scene.effects.self_collision,
                      continuous, thick, spacing_of(bodies)) if precise else None
+    rapid = rapid_of(bodies, numbering, found, contact, inverse_mass, belongs) if continuous else None
+    rest = rest_of(scene, bodies, numbering, inverse_mass, hulls, real) if exact is None and rapid is None else None
     return Contact(moving(found) if contact is not None else None, contact, meshes_of(found, size), hulls, meet, trees, spheres,
                    points, mixed, rigid, touches, features,
                    friction,
                    restitution_of(scene, found, bodies, numbering, size, hulls, points, FIRST_ROOM, real),
-                   rest_of(scene, bodies, numbering, inverse_mass, hulls, real), exact,
-                   rapid_of(bodies, numbering, found, contact, inverse_mass, belongs) if continuous else None)
+                   rest, exact, rapid)
 
 
 def hulls_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, found: list[Solid], belongs: Integers,

@@ -209,6 +209,8 @@ def no_contact(prepared: Prepared, world: World) -> str:
 def rest_reason(prepared: Prepared, active: Effects) -> str:
     if prepared.scene.effects.rest is None:
         return "effects.rest is left out"
+    if active.exact is not None or active.rapid is not None:
+        return "named, but exact contact and continuous collision would not wake what rests"
     return "effects.rest" if active.rest is not None else "named, but there is no rigid body that may rest on something"
 
 

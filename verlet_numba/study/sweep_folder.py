@@ -97,6 +97,8 @@ def read_result(folder: Path, run: str) -> Result | None:
         result = Result(**json.loads((place / RESULT).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
+    if not (isinstance(result.measures, dict) and isinstance(result.seconds, int | float) and isinstance(result.frames, int)):
+        return None
     lost = result.status in LASTING and result.frames and not (place / TRAJECTORY).exists()
     return None if lost or result.id != run else result
 

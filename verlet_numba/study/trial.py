@@ -40,7 +40,7 @@ class Outcome:
 
 def under(loaded: Loaded, settings: Settings, sets: Sequence[str]) -> Loaded:
     """The scene under these settings. Raises SceneError for what the scene or the program does not allow."""
-    overrides = [f"{path}={json.dumps(value)}" for path, value in {**settings, **IN_FULL}.items()]
+    overrides = [f"{path}={json.dumps(value, ensure_ascii=False)}" for path, value in {**settings, **IN_FULL}.items()]
     return loads(loaded.source.text, loaded.source.name, [*sets, *overrides])
 
 

@@ -56,7 +56,7 @@ def view(path: str | Path, output: str | Path, frames: Sequence[int | slice] | N
         if trajectory.particles == 0:
             raise RenderError(f"{path}: has no particles, so there is nothing to show")
         asked = choose(trajectory, frames, len(trajectory))
-        every = max(1, -(-len(asked) * trajectory.particles * 6 // int(budget)))
+        every = max(1, -(-len(asked) * trajectory.particles * 6 // max(1, int(budget))))
         shown = asked[::every]
         try:
             header, arrays = contents(trajectory, shown)
