@@ -61,6 +61,9 @@ class Ended:
     def troubles(self) -> Iterator[str]:
         """What is not as it should be: runs that failed, results of another program, a signal."""
         yield from disk.failures(self.failed, self.plan.parameters)
+        values = {run.id: list(run.values) for run in self.plan.runs}
+        yield from disk.failures([disk.Row(values[result.id], result) for result in (*self.kept, *self.done)
+                                  if result.status == COMPLETE and result.reason], self.plan.parameters)
         from verlet_numba.batch.work import program
         others = [result for result in self.kept if result.program != program()]
         if others:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from verlet_numba.batch.group import Job
     from verlet_numba.run.simulate import Summary
 
+APART = "complete, but a stick ends at more than twice its length: what it belongs to has come apart"
 SIGNED = ("physics", "kernels", "effects", "scene", "run", "buffers.py", "frame.py")       # what a result comes from
 
 
@@ -128,7 +129,7 @@ def result_of(job: "Job", outcome: "Summary | Exception", measures: Sequence[str
     if isinstance(outcome, Exception):
         return Result(job.id, FAILED, 0.0, {}, reason=one_line(outcome), program=program())
     found: dict[str, float | None] = {}
-    reason = str(outcome.divergence) if outcome.divergence is not None else ""
+    reason = str(outcome.divergence) if outcome.divergence is not None else APART if outcome.torn else ""
     if outcome.frames:
         try:
             with reader.open(job.output) as trajectory:

@@ -139,10 +139,10 @@ def view(trajectory: Path, output: Path, frames: str | None, budget: float, over
     except RenderError as error:
         raise Misuse(str(error)) from error
     if page.every > 1 and not quiet:
-        say(f"{output}: {page.of} frames are more than {budget:g} MB of positions, so every {page.every}. is shown; "
+        say(f"{output}: {page.of} frames are more than {budget:g} MB of positions, so one in {page.every} is shown; "
             "choose others with --frames, or allow more with --budget")
     if not quiet:
-        click.echo(f"{output}: {page.frames} frames, {page.size / 1e6:.2f} MB, positions within {page.error:.2g} m")
+        click.echo(f"{output}: {counted(page.frames, 'frame')}, {page.size / 1e6:.2f} MB, positions within {page.error:.2g} m")
 
 
 @click.command()

@@ -40,6 +40,8 @@ def validate(source: Source, problems: Sequence[Problem] = (), sets: Sequence[st
         raise SceneError([source.problem((), "empty: nothing but white space and comments stands here")])
     if not isinstance(source.data, dict):
         raise SceneError([*problems, source.problem((), "a scene is a mapping: `version: 1`, `time: ...` and so on")])
+    if {"scene", "parameters"} <= source.data.keys():
+        raise SceneError([source.problem(("scene",), "this is a sweep, not a scene; use `verlet-numba sweep`", key=True)])
     source, more = override(source, sets)
     found = [*problems, *more]
     scene = None

@@ -34,9 +34,15 @@ def problems(error: ValidationError, source: Source, model: type[BaseModel] = Sc
                 yield source.problem(path, message)
 
 
+OTHER_NAMES = {"center": "position", "centre": "position", "origin": "position", "location": "position", "static": "fixed"}
+"""What other programs call some keys."""
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """` (did you mean 'x'?)`, or nothing if no known word is near."""
-    near = get_close_matches(word, list(known), n=1, cutoff=0.6) if len(word) <= 60 else []
+    known = list(known)
+    near = [OTHER_NAMES[word]] if OTHER_NAMES.get(word) in known else get_close_matches(
+        word, known, n=1, cutoff=0.6) if len(word) <= 60 else []
     return f" (did you mean '{near[0]}'?)" if near else ""
 
 

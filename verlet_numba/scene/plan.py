@@ -97,8 +97,8 @@ def phases(prepared: Prepared, model: Model) -> Iterator[Phase]:
     yield from contacts(prepared, model)
     asked = scene.effects.continuous_collision
     yield Phase("continuous collision", active.rapid is not None or (asked and active.exact is not None),
-                "effects.continuous_collision" if active.rapid or active.exact else "effects.continuous_collision is off"
-                if not asked else "nothing that may meet something on its way")
+                "effects.continuous_collision is off" if not asked else
+                "effects.continuous_collision" if active.rapid or active.exact else "nothing that may meet something on its way")
     yield Phase("bending", active.bending is not None, unnamed if effects.bending is None else named if active.bending else
                 "named, but there is neither cloth nor a rope of two segments" if effects.bending.stiffness else nothing)
     yield Phase("orientation guard", active.orientation is not None,

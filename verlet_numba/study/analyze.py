@@ -103,7 +103,8 @@ def table(analyses: Sequence[Analysis]) -> Iterator[str]:
     for place, analysis in enumerate(analyses, start=1):
         which = f"{place}: " if len(analyses) > 1 else ""
         end = f", {analysis.time[0]:.6g} to {analysis.time[-1]:.6g} s" if len(analysis.time) else ""
-        yield f"{which}{analysis.file}: {analysis.status}, {len(analysis.time)} frames{end}"
+        status = "under way or killed" if analysis.status == "running" else analysis.status
+        yield f"{which}{analysis.file}: {status}, {len(analysis.time)} frame{'' if len(analysis.time) == 1 else 's'}{end}"
     head = "".join(f"{text:>{WIDTH}}" for text in ("last", "least", "most"))
     yield " " * wide + "".join(f"{f'{place}:' if len(analyses) > 1 else '':>4}{head}" for place in range(1, len(analyses) + 1))
     for name, kind in names.items():

@@ -244,7 +244,7 @@ def failures(rows: Sequence[Row], parameters: Sequence[str]) -> Iterator[str]:
     for row in rows:
         reasons.setdefault(row.result.reason, []).append(row)
     for reason, alike in reasons.items():
-        yield f"{len(alike)} {alike[0].result.status}: {reason}"
+        yield f"{len(alike)} {'' if reason.startswith(alike[0].result.status) else alike[0].result.status + ': '}{reason}"
         for row in alike[:10]:
             values = (f"{name}={short(value)}" for name, value in zip(parameters, row.values, strict=True))
             yield f"  {row.result.id}  {' '.join(values)}"

@@ -1,5 +1,6 @@
 """A sweep as a picture: what each parameter does to each measure, and the measures against each other."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def draw(known: Table, path: Path) -> None:
         shares = np.array([[explained(axis, values) for axis in parameters] for values in measures.values()])
         draw_effects(parts[0], parameters, measures, shares)
         if pairs:
-            draw_pairs(parts[1], parameters[int(np.argmax(shares.sum(axis=0)))], measures)
+            draw_pairs(parts[1], parameters[int(np.argmax(np.nansum(shares, axis=0)))], measures)
     figure.savefig(path, dpi=120)
 
 
@@ -90,14 +91,15 @@ def varying(known: Table) -> dict[str, Numbers]:
 def explained(axis: Axis, values: Numbers) -> float:
     """The share of a measure's variance that the means over a parameter's bins have: 1 if it depends on nothing else.
 
-    What chance alone would explain is taken off (adjusted R squared of the analysis of variance).
+    What chance alone would explain is taken off (adjusted R squared of the analysis of variance). NaN where it cannot be told:
+    with a single run in each bin, or values that are all the same.
     """
     there = np.isfinite(values)
     bins = [values[mask & there] for mask in axis.bins()]
     bins = [part for part in bins if len(part)]
     count, total = there.sum(), float(((values[there] - values[there].mean()) ** 2).sum())
     if count <= len(bins) or total == 0.0:
-        return 0.0
+        return math.nan
     within = sum(float(((part - part.mean()) ** 2).sum()) for part in bins)
     return max(0.0, 1.0 - float(within / (count - len(bins)) * (count - 1)) / total)
 
@@ -111,14 +113,14 @@ def draw_effects(part: Any, parameters: Sequence[Axis], measures: dict[str, Numb
             panel.plot(axis.at, values, "o", color="C0", markersize=3.2, markeredgewidth=0,
                        alpha=0.7 if len(values) < 200 else 0.35)
             panel.plot(*means(axis, values), "-o", color="C3", linewidth=1.6, markersize=3.5)
-            panel.text(0.97, 0.95, f"{shares[row, column]:.0%}", transform=panel.transAxes, ha="right", va="top", fontsize=8,
-                       color="C3", bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0})
+            if math.isfinite(shares[row, column]):
+                panel.set_title(f"{shares[row, column]:.0%}", loc="right", fontsize=8, color="C3", pad=2)
             dress(panel, axis if row == 0 else None, values)
             if column == 0:
                 panel.set_ylabel(label(name), fontsize=8)
             if row == len(measures) - 1:
                 panel.set_xlabel(shortened(axis.name), fontsize=8)
-    part.suptitle("main effects: dots are runs, the line their mean, % the share of the variance explained", fontsize=9)
+    part.suptitle("main effects: dots are runs, the line their mean,\n% the share of the variance explained", fontsize=9)
 
 
 def means(axis: Axis, values: Numbers) -> tuple[Numbers, Numbers]:
