@@ -9,6 +9,7 @@ import sys
 import pytest
 from sweeps_under_way import assert_whole, at_work, rows, start, until
 
+pytestmark = pytest.mark.validate
 pytest.importorskip("distributed", reason="Dask distributed is not installed: pip install 'verlet-numba[cluster]'")
 
 

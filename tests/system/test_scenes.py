@@ -9,6 +9,7 @@ from verlet_numba.scene.prepare import prepare
 
 SCENES = Path(__file__).parents[2] / "scenes"
 FILES = sorted(path.relative_to(SCENES) for path in SCENES.rglob("*.yaml") if path.parent.name not in ("hard", "sweeps"))
+LONG = {"bowl", "bouncing_icosahedron", "covered_crates", "rope_net"}      # effects that nothing else needs compiled: minutes
 KNOWN = ("not simulated yet",)      # bodies pass through each other: the scenes say so themselves
 
 
@@ -18,7 +19,8 @@ def test_scene_is_good(scene):
     assert [text for text in warnings if not any(known in text for known in KNOWN)] == []
 
 
-@pytest.mark.parametrize("scene", FILES, ids=str)
+@pytest.mark.parametrize("scene", [pytest.param(path, marks=[pytest.mark.validate] * (path.stem in LONG)) for path in FILES],
+                         ids=str)
 def test_scene_runs(simulate, scene):
     """Three frames after the start, all numbers finite, sticks near their lengths, nothing deep in a collider."""
     run = simulate(scene, {"time.duration": 0.05, "time.frame_rate": 60})

@@ -219,11 +219,11 @@ def material_reason(effect: object, name: str) -> str:
 
 
 def buffers(world: World) -> Iterator[tuple[str, int]]:
-    """Bytes of every part of the world that exists."""
+    """Bytes of every part of the world that has buffers of its own."""
     for name, part in world._asdict().items():
         if name == "effects":
             for effect, value in part._asdict().items():
-                if value is not None:
+                if value is not None and size(value):
                     yield f"effects.{effect}", size(value)
         elif isinstance(part, tuple) and name != "solver":
             yield name, size(part)

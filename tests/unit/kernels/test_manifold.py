@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import POINTS, Hulls, Manifold, Meetings, Pairs
+from verlet_numba.buffers import NO_ROOM, POINTS, Hulls, Manifold, Meetings, Pairs
 from verlet_numba.kernels.manifold import FLAT, NEAR, PARALLEL, widen
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -386,9 +386,11 @@ def test_contacts_of_a_pair_stay_side_by_side_and_each_pair_has_its_own():
 
 
 @pytest.mark.parametrize("capacity", [5, 8, 15])
-def test_full_meetings_are_left_as_they_were(capacity):
+def test_full_meetings_say_so_and_are_left_as_they_were(capacity):
     case, same = many(capacity), many(capacity)
     assert not widen(*case)
+    assert case.meetings.listed[0] == NO_ROOM
+    case.meetings.listed[0] = same.meetings.listed[0]
     for array, before in zip(case.meetings, same.meetings, strict=True):
         np.testing.assert_array_equal(array, before)
     contacts(case)

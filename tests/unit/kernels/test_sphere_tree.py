@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from verlet_numba.buffers import NO_ROOM
 from verlet_numba.kernels.sphere_candidates import find_spheres, outdated, travelled
 from verlet_numba.kernels.sphere_tree import expire, list_against, list_pairs, update_layered, update_wrapped
 from verlet_numba.physics.flatness import unfolded
@@ -443,7 +444,7 @@ def test_a_list_that_had_no_room_is_made_again():
     this = case([(shape, shape.positions[None])])
     small = spheres_of(this.layered, 0.1, 4)
     assert not find_spheres(this.position, this.inverse_mass, this.layered, True, this.stack, small)
-    assert small.candidates.listed[0] == -1
+    assert small.candidates.listed[0] == NO_ROOM
     large = spheres_of(this.layered, 0.1, 4000)._replace(at=small.at)
     large.candidates.listed[0] = small.candidates.listed[0]
     assert find_spheres(this.position, this.inverse_mass, this.layered, True, this.stack, large)
