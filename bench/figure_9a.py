@@ -5,6 +5,7 @@ default; then bars. Icosahedra fill a tenth of the room whatever their number; a
 are of the processor in one thread.
 """
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ from typing import Any
 import click
 import numpy as np
 import report
+from cases import prepared
 from experiments import RESULTS, Array, advanced, beyond, bodies_of, deepest_pair, e1, inside, mirrored, started
 from report import Figure, figure
 
-from verlet_numba.scene.build import Model
+from verlet_numba.run.engine import run_chunk, spread_over, start, warm
+from verlet_numba.scene.build import Model, build, frames
 
 STUDY = "figure 9a"
 PAPER = {1: 575.0, 50: 20.0}            # frames/s, read off the chart; Pentium IV, 1.8 GHz
@@ -63,6 +66,20 @@ def growth(curves: Curves, small: int, large: int) -> Iterator[Figure]:
     for setting, rates in curves.items():
         exponent = np.log(rates[small] / rates[large]) / np.log(large / small)
         yield figure(STUDY, f"{small:,} to {large:,}, {setting}", "exponent of time", "1", exponent)
+
+
+def on_threads(count: int, seconds: float, threads: tuple[int, ...]) -> Iterator[Figure]:
+    """Frames a second of the paper's step by the clock, whose result does not depend on the threads."""
+    for number in threads:
+        ready = prepared(e1(count, **SETTINGS["paper, sweep"]))
+        model = spread_over(start(build(ready.scene, ready.bodies)), number)
+        warm(model)
+        chunk = frames(model, round(seconds * RATE))
+        clock = time.perf_counter()
+        run_chunk(model, chunk)
+        rate = len(chunk.measures) / (time.perf_counter() - clock)
+        case = f"{count:,} icosahedra, paper, sweep, {number} thread{'s' * (number > 1)}"
+        yield figure(STUDY, case, "frames a second by the clock", "1/s", rate, at_least=20 if number == 2 else None)
 
 
 def depths(count: int, seconds: float, substeps: range, barred: bool) -> Iterator[Figure]:
@@ -128,6 +145,7 @@ def draw(curves: Curves, where: str, path: Path) -> None:
 def studies(curves: Curves) -> Iterator[Figure]:
     yield from frame_rates(COUNTS + LARGE, 5.0, 3, curves)
     yield from growth(curves, *LARGE)
+    yield from on_threads(LARGE[-1], 5.0, (1, 2))
     yield from depths(1000, 5.0, range(2, 9), True)
     yield from at_rest(200, 15.0, 5.0, False, rest=False)
     yield from at_rest(200, 15.0, 5.0, True, rest=True)
