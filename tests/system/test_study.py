@@ -139,6 +139,7 @@ def test_no_simulator_is_loaded(mixed, command):
     assert not loaded & {"numba", "llvmlite", "matplotlib", "trimesh"}
 
 
+@pytest.mark.validate
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts memory as Linux does")
 def test_memory_does_not_grow_with_the_file(verlet, tmp_path):
     """331 MB of positions and velocities are measured in less than 260 MB, Python itself included."""
