@@ -211,7 +211,7 @@ def test_signals_end_a_run_with_its_file_finished(write_scene, tmp_path, number)
     status, count = readable(output)
     assert status == "stopped"
     assert f"{count:,} frames kept in {output}" in errors
-    assert f"stopped, {count} frames" in told
+    assert f"stopped, {count:,} frames" in told
     assert count < 6_000_000
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml", "x.vtkhdf", "x.vtkhdf.checkpoint"]
 

@@ -42,6 +42,8 @@ def find(path: Path) -> Found:
             taken = {"relaxations": "sum", "contacts": "max", "constraint_error_max": "max", "penetration_max": "max"}
             measures = {name: getattr(file[f"observables/{name}/value"][:frames], how)().item()
                         for name, how in taken.items() if frames and name in file["observables"]}
+            if "constraint_error_max" in measures:
+                measures["constraint_error_end"] = float(file["observables/constraint_error_max/value"][frames - 1])
             return Found(frames, len(file["VTKHDF/Steps/PointOffsets"]), told["status"].rstrip(b"\0").decode(),
                          json.loads(told["scene"]), json.loads(told["timing"]), measures)
     except READABLE as error:

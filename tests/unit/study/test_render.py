@@ -96,7 +96,7 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(path, tmp_path, output, fra
 
 
 def test_a_damaged_scene_is_refused_in_one_line(tmp_path):
-    with pytest.raises(RenderError, match="damaged"):
+    with pytest.raises(reader.TrajectoryError, match="damaged"):
         render(write(tmp_path / "a.vtkhdf", [{"kind": "box", "size": "huge"}]), tmp_path / "a.png")
 
 
