@@ -96,7 +96,8 @@ CASES = {"pendulum": PENDULUM, "rope": ROPE, "cloth": CLOTH, "everything": world
          "heap": HEAP}
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.validate] * (name in ("cloth", "everything", "heap"))) for name in CASES])
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=[pytest.mark.validate] * (name in ("cloth", "everything", "heap"))) for name in CASES])
 def test_a_run_that_stops_again_and_again_has_the_datasets_of_an_undisturbed_one(scene, pieces, tmp_path, name):
     prepared = scene(CASES[name])
     whole = run(prepared, tmp_path / "whole.vtkhdf")
