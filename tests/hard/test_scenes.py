@@ -11,8 +11,8 @@ from verlet_numba.study.verify import IN_FULL, prepare_all, run_case
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "scenes" / "hard").glob("*.yaml"))
 
-LONG = ("b01", "b02", "b03", "b04", "b05", "b17", "b18", "b19", "b20", "b27", "b28", "b29", "b30", "b32", "b33", "b34", "b35", "b36",
-        "b37", "b38", "b39", "b40", "b41", "b45")
+LONG = ("b01", "b02", "b03", "b04", "b05", "b17", "b18", "b19", "b20", "b27", "b28", "b29", "b30", "b32", "b33", "b34", "b35",
+        "b36", "b37", "b38", "b39", "b40", "b41", "b45")
 """Minutes of stepping, or effects that nothing else needs compiled."""
 
 NOT_HELD = {
