@@ -145,6 +145,7 @@ def test_orders_of_convergence(simulate):
     np.testing.assert_allclose(slopes(spun), 2, atol=0.15)
 
 
+@pytest.mark.validate
 def test_a_block_that_touches_slides_as_ever(simulate):
     """It is hit in every substep, so takes the present direction, and friction is Coulomb's: g (sin 30 - 0.3 cos 30) t^2 / 2."""
     run = simulate(Path("validation/incline_slides.yaml"), START)
@@ -159,6 +160,7 @@ DICE = {"version": 1, "time": {"duration": 3, "frame_rate": 60}, "seed": 3,
         "colliders": [{"kind": "room", "size": [3, 3, 3]}], "effects": {"gravity": [0, 0, -G]}}
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize(("substeps", "iterations"), [(1, 10), (4, 1)])
 def test_collisions_fall_back_to_present_directions(simulate, substeps, iterations):
     """Without the guard this goes to infinity."""
