@@ -27,6 +27,7 @@ import numpy as np
 
 config: Any = numba.config
 types: Any = numba.types
+prange: Any = numba.prange
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,

@@ -122,7 +122,7 @@ def test_verify_tells_what_it_has_when_a_signal_comes(compiling, write_scene, tm
     told, errors = compiling("verify", scene, tmp_path / "other.yaml", "--json")
     assert [case["trouble"] for case in told["cases"]] == ["stopped after 0 s"]
     assert told["not_run"] == 1
-    assert errors == "stopped by a signal; 1 scenes were not run"
+    assert errors == "stopped by a signal; 1 scene not run"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

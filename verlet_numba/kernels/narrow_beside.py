@@ -4,9 +4,7 @@ A pair's contact depends on nothing but its two hulls and what the pair learnt, 
 the pairs: so the contacts are, bit for bit, those of one thread, for any number of threads.
 """
 
-from numba import prange
-
-from verlet_numba._jit import kernel, threaded
+from verlet_numba._jit import kernel, prange, threaded
 from verlet_numba.buffers import NO_ROOM
 from verlet_numba.kernels.narrow import collide_some
 

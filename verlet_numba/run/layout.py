@@ -10,6 +10,7 @@ What the readers insist on, found by trial:
 """
 
 import hashlib
+import secrets
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -106,7 +107,8 @@ def blank(contents: Contents, planned_frames: int) -> bytes:
     digest = contents.topology(planned_frames)
     known, image = _kept
     if known != digest:
-        with h5py.File("blank", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        name = f"blank {secrets.token_hex(8)}"          # HDF5 knows open files by name: two threads must not share one
+        with h5py.File(name, "w", driver="core", backing_store=False, libver=LIBVER) as file:
             create_layout(file, contents, planned_frames)
             file.flush()
             image = file.id.get_file_image()

@@ -76,6 +76,7 @@ def test_files_are_those_of_single_runs_for_any_number_of_threads(alone, tmp_pat
     digests, summaries = alone
     scenes, paths = ropes(9) + others(), [tmp_path / f"{k}.vtkhdf" for k in range(11)]
     found = in_order(simulate_together(scenes, paths, threads=threads))
+    assert [each for each in found if isinstance(each, Exception)] == []
     assert [digest(path) for path in paths] == digests
     for mine, single in zip(found, summaries, strict=True):
         for key in ("frames", "substeps", "status", "relaxations", "contacts", "constraint_error_max", "divergence"):
