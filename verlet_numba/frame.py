@@ -13,15 +13,17 @@ from verlet_numba.effects.contact import penetration, separate, touching
 from verlet_numba.effects.continuous import arrest
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
-from verlet_numba.effects.exact import deepest_gap, find_exact, limit_exact, part_exact, pushing_gaps
+from verlet_numba.effects.exact import deepest_gap, find_exact, pushing_gaps
 from verlet_numba.effects.features import begin_features, part_features, rub_features
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.gravity import fall
+from verlet_numba.effects.hold_back import limit_exact
 from verlet_numba.effects.impact import strike_bodies, strike_spheres
 from verlet_numba.effects.meet import depth_of_hulls, find_meetings, gather, gather_again, move_hulls, pushing
 from verlet_numba.effects.mesh_contact import deepest_in_meshes
 from verlet_numba.effects.most_moved import choose_lists, note_places
 from verlet_numba.effects.motion import carry, move
+from verlet_numba.effects.open_gaps import part_exact
 from verlet_numba.effects.orientation import keep_orientation
 from verlet_numba.effects.recall import begin_pass, keep_colliders, keep_hulls, recall_colliders, recall_hulls
 from verlet_numba.effects.response import displace, kick_back, link, rebound, shove

@@ -13,6 +13,7 @@ hardly damped: a strip swings. Angles share particles, so that of a very stiff b
 import numpy as np
 
 from verlet_numba._jit import kernel
+from verlet_numba.kernels.relax_angles import move_three
 from verlet_numba.physics.angle import bend, between
 from verlet_numba.physics.hinge import gradients, off_rest
 from verlet_numba.physics.returning import owed
@@ -105,15 +106,7 @@ def straighten(again, position, previous, share, joints):
         jx, jy, jz = np.float64(x[j]), np.float64(y[j]), np.float64(z[j])
         moved = bend(x[i] - jx, y[i] - jy, z[i] - jz, x[k] - jx, y[k] - jy, z[k] - jz, now - by, 0.0,
                      joints.weight[0, a], joints.weight[1, a], joints.weight[2, a])
-        x[i] += moved[0]
-        y[i] += moved[1]
-        z[i] += moved[2]
-        x[j] += moved[3]
-        y[j] += moved[4]
-        z[j] += moved[5]
-        x[k] += moved[6]
-        y[k] += moved[7]
-        z[k] += moved[8]
+        move_three(x, y, z, i, j, k, moved)
 
 
 @kernel

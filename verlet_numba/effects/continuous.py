@@ -11,20 +11,12 @@ import math
 
 from verlet_numba._jit import kernel
 from verlet_numba.buffers import NO_ROOM
-from verlet_numba.effects.exact import (
-    begin_wholes,
-    bound_gaps,
-    bring,
-    bring_corners,
-    give_of_whole,
-    hold_back,
-    shove_whole,
-    take_back,
-    tell_short,
-)
+from verlet_numba.effects.exact import bring, bring_corners, tell_short
+from verlet_numba.effects.hold_back import bound_gaps, hold_back
+from verlet_numba.effects.open_gaps import begin_wholes, give_of_whole, shove_whole, take_back
 from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.kernels.near_features import list_features, of_pair
-from verlet_numba.kernels.pieces import list_against_others, list_among, update_pieces
+from verlet_numba.kernels.pieces import list_pieces, update_pieces
 
 ROUNDS = 256            # through the impacts, at most: they are few
 SETTLED = 1e-6          # of the largest impulse: a round that changes less is the last
@@ -73,11 +65,8 @@ def find_impacts(rapid, listing, among):
         step[p] = slack[p] = math.sqrt(x * x + y * y + z * z)
         path[p] = 0.0
     update_pieces(start, points.radius, slack, rapid.pieces)
-    if among:
-        fits = list_among(rapid.pieces, None, listing.stack, listing.pairs)
-    else:
-        fits = list_against_others(rapid.pieces, listing.stack, listing.pairs)
-    if not fits or not list_features(start, points, rapid.pieces, listing):
+    if not (list_pieces(rapid.pieces, among, None, listing.stack, listing.pairs)
+            and list_features(start, points, rapid.pieces, listing)):
         listing.made[0] = NO_ROOM
         return False
     listed = gaps.listed[0]

@@ -7,7 +7,7 @@ their distance there: else a cloth thicker than its cells would press on itself 
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NEARER
+from verlet_numba.buffers import NEARER, NO_ROOM
 from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.physics.closest import of_segments, on_triangle
 
@@ -54,7 +54,7 @@ def list_features(place, points, pieces, listing):
                     if not (c == d and single) and not edges_beyond(place, a, b, c, d, far):
                         listed = list_one(place, rest, same, moves, radius, body, point, kind, reach, left,
                                           a, b, c, d, 1, far, listed)
-        if listed < 0:
+        if listed == NO_ROOM:
             return False
     listing.made[0] = listed
     return True
@@ -92,8 +92,8 @@ def edges_beyond(place, a, b, c, d, far):
 
 @kernel
 def list_one(place, rest, same, moves, radius, body, point, kind, reach, left, a, b, c, d, edges, far, listed):
-    """List one pair if it is nearer than `far`; the new number of pairs, -1: there is no room, or was none."""
-    if listed < 0 or not moves[a] | moves[b] | moves[c] | moves[d] or shared(same[a], same[b], same[c], same[d], edges):
+    """List one pair if it is nearer than `far`; the new number of pairs, or NO_ROOM: there is none, or was none."""
+    if listed == NO_ROOM or not moves[a] | moves[b] | moves[c] | moves[d] or shared(same[a], same[b], same[c], same[d], edges):
         return listed
     distance, whole = distance_of(place, a, b, c, d, edges), radius[a] + radius[d]
     nearest = whole
@@ -102,7 +102,7 @@ def list_one(place, rest, same, moves, radius, body, point, kind, reach, left, a
     if not distance < far - whole + nearest:
         return listed
     if listed == left.size:
-        return -1
+        return NO_ROOM
     point[listed, 0], point[listed, 1], point[listed, 2], point[listed, 3] = a, b, c, d
     kind[listed], reach[listed], left[listed] = edges, nearest, distance - nearest
     return listed + 1

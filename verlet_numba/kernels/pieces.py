@@ -12,7 +12,8 @@ where anything is, so that results do not depend on when a list was made.
 """
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.kernels.sphere_tree import SLACK
+from verlet_numba.buffers import NO_ROOM
+from verlet_numba.kernels.sphere_tree import SLACK, visit_halves
 from verlet_numba.physics.flatness import unfolded
 
 
@@ -60,13 +61,18 @@ def update_edges(place, pieces):
 
 
 @kernel
-def list_among(pieces, itself, stack, pairs):
-    """List pairs of pieces of deformable bodies that are near, of each with itself if it is not None. False: no room."""
+def list_pieces(pieces, among, itself, stack, pairs):
+    """List pairs of pieces that are near each other. False: no room.
+
+    among: 1: of bodies in the first `soft` trees with each other, of each with itself if `itself` is not None; 0: of those with
+    all others.
+    """
     listed, soft = 0, pieces.soft
     for t in range(soft):
-        for u in range(own(t, itself), soft):
+        low, high = (own(t, itself), soft) if among else (soft, pieces.root.size - 1)
+        for u in range(low, high):
             listed = descend_pieces(t, u, pieces, stack, pairs, listed)
-            if listed < 0:
+            if listed == NO_ROOM:
                 return False
     pairs.listed[0] = listed
     return True
@@ -81,21 +87,8 @@ def own(t, itself):
 
 
 @kernel
-def list_against_others(pieces, stack, pairs):
-    """List pairs of pieces near each other, of deformable bodies with rigid bodies and colliders. False: no room."""
-    listed, soft = 0, pieces.soft
-    for t in range(soft):
-        for u in range(soft, pieces.root.size - 1):
-            listed = descend_pieces(t, u, pieces, stack, pairs, listed)
-            if listed < 0:
-                return False
-    pairs.listed[0] = listed
-    return True
-
-
-@kernel
 def descend_pieces(t, u, pieces, stack, pairs, listed):
-    """List the pairs of pieces of two trees, or of one with itself; the new number of pairs, -1: no room."""
+    """List the pairs of pieces of two trees, or of one with itself; the new number of pairs, or NO_ROOM."""
     skip, piece, box, slack, rectangle = pieces.skip, pieces.piece, pieces.box, pieces.slack, pieces.rectangle
     bound, lattice, first, second = pieces.bound, pieces.lattice, stack.first, stack.second
     one, two = pairs.first, pairs.second
@@ -112,15 +105,11 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
                 continue
             if piece[k] >= 0:               # a cell that folds on itself
                 if listed == one.size:
-                    return -1
+                    return NO_ROOM
                 one[listed], two[listed] = piece[k], piece[k]
                 listed += 1
                 continue
-            c, d = k + 1, skip[k + 1]
-            first[height], second[height] = c, c
-            first[height + 1], second[height + 1] = d, d
-            first[height + 2], second[height + 2] = c, d
-            height += 3
+            height = visit_halves(first, second, height, k + 1, skip[k + 1])
             continue
         if apart(box, k, l):
             continue
@@ -133,7 +122,7 @@ def descend_pieces(t, u, pieces, stack, pairs, listed):
             continue
         if piece[k] >= 0 and piece[l] >= 0:
             if listed == one.size:
-                return -1
+                return NO_ROOM
             one[listed], two[listed] = piece[k], piece[l]
             listed += 1
         elif piece[l] >= 0 or skip[k] - k >= skip[l] - l:

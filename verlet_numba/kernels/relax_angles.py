@@ -19,17 +19,23 @@ def relax_angles(position, inverse_mass, angles, tolerance):
         jx, jy, jz = np.float64(x[j]), np.float64(y[j]), np.float64(z[j])
         moved = bend(x[i] - jx, y[i] - jy, z[i] - jz, x[k] - jx, y[k] - jy, z[k] - jz, angles.rest[a], slack,
                      np.float64(inverse_mass[i]), np.float64(inverse_mass[j]), np.float64(inverse_mass[k]))
-        x[i] += moved[0]
-        y[i] += moved[1]
-        z[i] += moved[2]
-        x[j] += moved[3]
-        y[j] += moved[4]
-        z[j] += moved[5]
-        x[k] += moved[6]
-        y[k] += moved[7]
-        z[k] += moved[8]
+        move_three(x, y, z, i, j, k, moved)
         relaxed += any_of(moved)
     return relaxed
+
+
+@inlined
+def move_three(x, y, z, i, j, k, moved):
+    """Move three particles by nine displacements."""
+    x[i] += moved[0]
+    y[i] += moved[1]
+    z[i] += moved[2]
+    x[j] += moved[3]
+    y[j] += moved[4]
+    z[j] += moved[5]
+    x[k] += moved[6]
+    y[k] += moved[7]
+    z[k] += moved[8]
 
 
 @inlined

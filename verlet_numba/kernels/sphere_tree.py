@@ -131,11 +131,7 @@ def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, rat
                     bound[r, 0], bound[r, 1], bound[r, 2], bound[r, 3], bound[r, 4], bound[r, 5],
                     bound[r, 6], bound[r, 7], bound[r, 8], bound[r, 9], bound[r, 10], bound[r, 11], a, b, ratio)):
                 continue
-            c, d = k + 1, skip[k + 1]
-            first[height], second[height] = c, c
-            first[height + 1], second[height + 1] = d, d
-            first[height + 2], second[height + 2] = c, d
-            height += 3
+            height = visit_halves(first, second, height, k + 1, skip[k + 1])
             continue
         if not overlap(sphere[k, 0], sphere[k, 1], sphere[k, 2], sphere[k, 3],
                        sphere[l, 0], sphere[l, 1], sphere[l, 2], sphere[l, 3], margin):
@@ -165,6 +161,15 @@ def descend(top, other, skip, particle, sphere, row, rectangle, bound, a, b, rat
             first[height + 1], second[height + 1] = k, l + 1
         height += 2
     return listed
+
+
+@inlined
+def visit_halves(first, second, height, c, d):
+    """Put the two halves of a node on the stack, each with itself and both with each other; the new height."""
+    first[height], second[height] = c, c
+    first[height + 1], second[height + 1] = d, d
+    first[height + 2], second[height + 2] = c, d
+    return height + 3
 
 
 @kernel

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import worlds
 
-from verlet_numba.effects.exact import deepest_gap, find_exact, limit_exact, part_exact, pushing_gaps
+from verlet_numba.effects.exact import deepest_gap, find_exact, pushing_gaps
+from verlet_numba.effects.hold_back import limit_exact
+from verlet_numba.effects.open_gaps import part_exact
 from verlet_numba.kernels.impact_time import apart_at
 from verlet_numba.scene.crossing import crossings
 from verlet_numba.scene.exact import roomier_exact
