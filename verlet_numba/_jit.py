@@ -25,6 +25,8 @@ import llvmlite.binding as llvm
 import numba
 import numpy as np
 
+from verlet_numba._version import digest
+
 config: Any = numba.config
 types: Any = numba.types
 prange: Any = numba.prange
@@ -39,11 +41,7 @@ OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 
 def sources(package: Path = Path(__file__).parent) -> str:
     """Hash of all source that machine code is made from."""
-    digest = hashlib.sha256()
-    for source in sorted(path for name in COMPILED for path in (package / name, *(package / name).rglob("*.py")) if path.is_file()):
-        digest.update(f"{source.relative_to(package)}\0".encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
+    return digest(COMPILED, package)
 
 
 def fingerprint(package: Path = Path(__file__).parent) -> str:

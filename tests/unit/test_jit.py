@@ -21,11 +21,12 @@ RUN = ("from verlet_numba.kernels.caller import twice_and_one as f\n"
 
 @pytest.fixture
 def package(tmp_path):
-    """A package of the same name: _jit.py, a kernel, and in another file the kernel that it calls."""
+    """A package of the same name: _jit.py with what it needs, a kernel, and in another file the kernel that it calls."""
     folder = tmp_path / "verlet_numba"
     kernels = folder / "kernels"
     kernels.mkdir(parents=True)
-    shutil.copy(PACKAGE / "_jit.py", folder)
+    for name in ("_jit.py", "_version.py"):
+        shutil.copy(PACKAGE / name, folder)
     for place in (folder, kernels):
         (place / "__init__.py").touch()
     (kernels / "callee.py").write_text(CALLEE.format(factor=2.0))

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from verlet_numba.run.ensemble import Instance, blocks, model_alone, simulate_block
+from verlet_numba.run.engine import start, warm
+from verlet_numba.run.ensemble import Instance, blocks, model_alone, model_of, simulate_block
 from verlet_numba.run.resume import ResumeError
 from verlet_numba.run.signals import StopSignals
 from verlet_numba.run.simulate import Summary, simulate
@@ -49,6 +50,15 @@ def advance_group(jobs: Sequence[Job], begin: Callable[[str], None]) -> Iterator
         yield from ((jobs[member.number], outcome) for member, outcome in zip(block, outcomes, strict=True))
         if any(isinstance(outcome, Summary) and outcome.signal is not None for outcome in outcomes):
             return
+
+
+def warm_group(jobs: Sequence[Job]) -> None:
+    """Make or load the machine code of what `advance_group` will simulate: of a run alone, and of several side by side."""
+    scenes = [prepared(job.loaded) for job in jobs]
+    members = [Instance(k, scene, job.output, job.command, model_alone(scene))
+               for k, (job, scene) in enumerate(zip(jobs, scenes, strict=True))]
+    for block in {len(block) > 1: block for block in blocks(members)}.values():
+        warm(start(model_of(block)))
 
 
 def together(block: list[Instance]) -> list[Summary | Exception]:

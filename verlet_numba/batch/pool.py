@@ -8,8 +8,8 @@ BLAS do not survive a fork.
 - What it had begun is a *suspect*: it is tried again at the end of the queue, alone; after two deaths when all else is done;
   after three it is set aside. So a run that kills its workers takes nothing with it, and one that was hit by chance is not
   taken for a killer while there is other work to be hit.
-- A suspect that is then done was an accident. Where there are many, something else kills, and a death is weak evidence: 50
-  random kills among 200 runs hit one of them three times every other time. So accidents earn further tries.
+- A death all of whose suspects are then done was an accident. Where there are many, something else kills, and a death is weak
+  evidence: 50 random kills among 200 runs hit one of them three times every other time. So accidents earn further tries.
 - A worker whose parent dies ends itself.
 """
 
@@ -27,7 +27,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, Protocol, Self, TypeVar
 
 MOST_TRIES = 3
-ACCIDENTS = 5                   # deaths of runs that then succeeded: for so many of them everyone has one more try
+ACCIDENTS = 5                   # deaths of which all that was begun then succeeded: for so many everyone has one more try
 MOST_FAILED_STARTS = 3          # in a row, by errors of their own
 LOOK_SECONDS = 0.2              # between two looks at signals
 GRACE_SECONDS = 1.2             # between asking a worker to end and ending it
@@ -174,7 +174,8 @@ class _Queue:
         self.batches = deque(batches)
         self.last: deque[Any] = deque()         # to be tried when all else is done
         self.deaths: dict[str, int] = {}
-        self.accidents = 0
+        self.unexplained: list[set[str]] = []   # of each death: the parts begun then that are not done since
+        self.accidents = 0                      # deaths that none of these parts can have caused
 
     def __bool__(self) -> bool:
         return bool(self.batches or self.last)
@@ -187,12 +188,17 @@ class _Queue:
 
     def done(self, key: str) -> None:
         """A part is done: whatever its workers died of was not its fault."""
-        self.accidents += self.deaths.pop(key, 0)
+        if self.deaths.pop(key, 0):
+            for parts in self.unexplained:
+                parts.discard(key)
+            self.accidents += self.unexplained.count(set())
+            self.unexplained = [parts for parts in self.unexplained if parts]
 
     def returned(self, batch: Any, left: Sequence[str], blamed: Sequence[str]) -> list[str]:
         """Take back what a dead worker has left undone. Returns the keys that are set aside."""
         if rest := [key for key in left if key not in blamed]:
             self.batches.appendleft(batch.only(rest))
+        self.unexplained.append(set(blamed))
         aside, most = [], MOST_TRIES + self.accidents // ACCIDENTS
         for key in blamed:
             self.deaths[key] = self.deaths.get(key, 0) + 1

@@ -134,7 +134,7 @@ def results(plan: Plan, folder: Path, missing: Sequence[Run], engine: Engine, st
     batches = [batch for group in groups for batch in group]
     with opened(engine, len(batches), stop) as pool:
         say("compiling what the runs need for this machine, once (kept for later runs) ...")
-        for _ in pool.work_through(work.warm_batch, [group[0].only(group[0].keys[:1]) for group in groups], at_once=1):
+        for _ in pool.work_through(work.warm_batch, [group[0] for group in groups], at_once=1):
             pass
         say("")
         for key, outcome in pool.work_through(work.simulate_batch, batches):

@@ -4,7 +4,6 @@ The process that hands out batches imports this too, but never Numba: what needs
 """
 
 import contextlib
-import hashlib
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,10 +11,10 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import verlet_numba
+from verlet_numba._version import __version__, digest
 from verlet_numba.scene.load import validate
 from verlet_numba.scene.overrides import override
-from verlet_numba.scene.problems import SceneError
+from verlet_numba.scene.problems import SceneError, one_line
 from verlet_numba.scene.source import Source, compose
 from verlet_numba.study import figures, reader
 from verlet_numba.study.sweep_folder import FAILED, LASTING, RESULT, TRAJECTORY, Result, read_result, run_folder, write_result
@@ -93,15 +92,15 @@ def simulate_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[s
 
 
 def warm_batch(batch: Batch, begin: Callable[[str], None], done: Callable[[str, None], None]) -> None:
-    """Machine code for the first run of a batch, without simulating it. What is wrong with the run is told when it is run."""
-    from verlet_numba.batch.group import prepared
-    from verlet_numba.run.warm import warm_up
+    """Machine code for the runs of a batch, without simulating them. What is wrong with one is told when it is run."""
+    from verlet_numba.batch.group import warm_group
 
-    first = batch.runs[0]
-    begin(first.id)
+    for run in batch.runs:
+        begin(run.id)
     with contextlib.suppress(Exception):
-        warm_up(prepared(job_of(batch, first).loaded))
-    done(first.id, None)
+        warm_group([job_of(batch, run) for run in batch.runs])
+    for run in batch.runs:
+        done(run.id, None)
 
 
 def job_of(batch: Batch, run: Named) -> "Job":
@@ -145,16 +144,7 @@ def seconds(summary: "Summary") -> float:
     return round(sum(spent for phase, spent in summary.seconds.items() if phase != "compile"), 6)
 
 
-def one_line(error: Exception) -> str:
-    words = " ".join(str(error).split())
-    return words if words and isinstance(error, OSError | ValueError) else f"{type(error).__name__}: {words}".rstrip(": ")
-
-
 @cache
 def program() -> str:
     """The program that makes a result: its version and a hash of the sources that a trajectory comes from."""
-    package = Path(verlet_numba.__file__).parent
-    digest = hashlib.sha256()
-    for source in sorted(path for name in SIGNED for path in (package / name, *(package / name).rglob("*.py")) if path.is_file()):
-        digest.update(source.read_bytes())
-    return f"{verlet_numba.__version__}+{digest.hexdigest()[:8]}"
+    return f"{__version__}+{digest(SIGNED)[:8]}"

@@ -52,7 +52,7 @@ def fail(error: BaseException, code: int, text: str) -> NoReturn:
 
 def main() -> None:
     """Run the command line; every error ends in a message and the contract's exit code."""
-    from verlet_numba.scene.problems import SceneError
+    from verlet_numba.scene.problems import SceneError, one_line
 
     arguments = [word for word in sys.argv[1:] if word != "--debug"]
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))       # else Python would run no `finally`
@@ -70,10 +70,3 @@ def main() -> None:
         fail(error, FAILED, "verlet-numba: out of memory; `verlet-numba plan` tells how much a scene needs")
     except Exception as error:
         fail(error, FAILED, f"verlet-numba: {one_line(error)}")
-
-
-def one_line(error: Exception) -> str:
-    """An error without its traceback, in one line. Those of the program and of the system need no name of their class."""
-    words = " ".join(str(error).split())
-    plain = isinstance(error, OSError | ValueError) or type(error).__module__.startswith("verlet_numba.")
-    return words if plain and words else f"{type(error).__name__}: {words}"

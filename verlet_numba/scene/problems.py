@@ -50,3 +50,10 @@ def shown(value: object) -> str:
     if isinstance(value, int | float):
         return f"{value:.15g}"
     return "a list" if isinstance(value, list | tuple) else "a mapping"
+
+
+def one_line(error: Exception) -> str:
+    """An error without its traceback, in one line. Those of the program and of the system need no name of their class."""
+    words = " ".join(str(error).split())
+    plain = isinstance(error, OSError | ValueError) or type(error).__module__.startswith("verlet_numba.")
+    return words if plain and words else f"{type(error).__name__}: {words}"

@@ -94,3 +94,24 @@ def test_where_others_die_and_then_succeed_a_death_counts_for_less(tmp_path):
 @pytest.mark.parametrize(("code", "words"), [(3, "with exit code 3"), (-signal.SIGSEGV, "by SIGSEGV"), (-199, "by signal 199")])
 def test_how_a_process_ended_is_told(code, words):
     assert words in manner(code)
+
+
+def test_a_killer_among_many_begun_at_once_has_three_tries(tmp_path):
+    """What is simulated side by side is begun and dies together: that the others are then done speaks for none but them."""
+    keys = tuple(f"part_{k}" for k in range(32))
+    todo = _Queue([])
+    assert todo.returned(Parts(keys, tmp_path), keys, keys) == []
+    for key in keys[1:]:
+        todo.done(key)
+    assert todo.accidents == 0
+    assert todo.returned(Parts(keys[:1], tmp_path), keys[:1], keys[:1]) == []
+    assert todo.returned(Parts(keys[:1], tmp_path), keys[:1], keys[:1]) == ["part_0"]
+
+
+def test_deaths_that_nothing_begun_explains_are_accidents(tmp_path):
+    todo = _Queue([])
+    todo.returned(Parts(("a", "b"), tmp_path), ("a", "b"), ("a", "b"))
+    todo.done("a")
+    assert todo.accidents == 0
+    todo.done("b")
+    assert todo.accidents == 1
