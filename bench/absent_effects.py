@@ -21,7 +21,7 @@ from report import Figure, figure
 from timing import computed, interleaved
 
 from verlet_numba import _jit, frame
-from verlet_numba.buffers import NUMBER
+from verlet_numba.buffers.world import NUMBER
 from verlet_numba.run import engine
 from verlet_numba.run.engine import State, start, warm
 from verlet_numba.scene.build import Model, build, frames

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from report import Figure, figure
 from timing import computed, interleaved
 
-from verlet_numba.buffers import Hulls
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.kernels.broad import all_pairs, sweep
 from verlet_numba.kernels.candidates import KEPT, RENEWED, refresh
 from verlet_numba.scene.capacity import pairs_of

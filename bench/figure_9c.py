@@ -31,7 +31,7 @@ import numpy as np
 import report
 from experiments import RESULTS, Array, e1, started
 
-from verlet_numba.buffers import NUMBER, World
+from verlet_numba.buffers.world import NUMBER, World
 from verlet_numba.effects.contact import find_contacts, separate
 from verlet_numba.effects.features import begin_features, part_features, rub_features
 from verlet_numba.effects.friction import rub

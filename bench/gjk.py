@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from timing import computed, interleaved
 
-from verlet_numba.buffers import Hulls, Pairs
+from verlet_numba.buffers.hulls import Hulls, Pairs
 from verlet_numba.kernels.gjk import MET, gjk
 from verlet_numba.kernels.narrow import collide
 from verlet_numba.scene.capacity import meetings_of

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from report import Figure, figure
 from timing import computed
 
-from verlet_numba.buffers import ERROR_MAX, FALLBACKS, Frames
+from verlet_numba.buffers.world import ERROR_MAX, FALLBACKS, Frames
 from verlet_numba.run.engine import run_chunk, start, warm
 from verlet_numba.scene.body import Shape
 from verlet_numba.scene.build import Model, build, frames

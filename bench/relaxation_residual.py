@@ -29,7 +29,7 @@ import report
 from numba import njit
 from numpy.typing import NDArray
 
-from verlet_numba.buffers import Graph
+from verlet_numba.buffers.constraints import Graph
 from verlet_numba.kernels.relax_graph import relax_graph, sort_bodies
 from verlet_numba.scene import shapes
 from verlet_numba.scene.body import Body

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from report import Figure, figure
 from timing import computed, interleaved
 
-from verlet_numba.buffers import Layered
+from verlet_numba.buffers.trees import Layered
 from verlet_numba.kernels.sphere_tree import list_pairs, update_layered
 from verlet_numba.scene import shapes
 from verlet_numba.scene.body import Body

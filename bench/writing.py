@@ -12,7 +12,7 @@ from cases import cloth, prepared, scene_of
 from report import Figure, figure
 from timing import interleaved, timed
 
-from verlet_numba.buffers import Frames
+from verlet_numba.buffers.world import Frames
 from verlet_numba.run import simulate as simulation
 from verlet_numba.run.engine import run_chunk, start
 from verlet_numba.scene.build import Model, build, frames

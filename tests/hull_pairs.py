@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verlet_numba.buffers import Hulls
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.scene.capacity import meetings_of
 from verlet_numba.scene.capacity import pairs_of as empty_pairs
 

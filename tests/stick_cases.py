@@ -3,7 +3,7 @@
 import numpy as np
 from reference import Stick
 
-from verlet_numba.buffers import Runs, Softness, Sticks
+from verlet_numba.buffers.constraints import Runs, Softness, Sticks
 
 H = 0.01
 

@@ -34,7 +34,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,
                          "_nrt": False}
-COMPILED = ("_jit.py", "buffers.py", "frame.py", "physics", "kernels", "effects")       # what machine code is made from
+COMPILED = ("_jit.py", "buffers", "frame.py", "physics", "kernels", "effects")       # what machine code is made from
 FOLDERS_KEPT = 4
 OURS = re.compile("[0-9a-f]{20}")        # names of folders, as fingerprints are
 

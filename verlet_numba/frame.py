@@ -6,7 +6,7 @@ the loop.
 """
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import ARRESTED, FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
+from verlet_numba.buffers.world import ARRESTED, FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.bending import unbend
 from verlet_numba.effects.contact import penetration, separate, touching

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import MOMENTUM
+from verlet_numba.buffers.world import MOMENTUM
 from verlet_numba.kernels.relax import relax_runs, relax_sticks
 from verlet_numba.kernels.relax_angles import relax_angles
 from verlet_numba.run.engine import start

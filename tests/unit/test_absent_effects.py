@@ -6,7 +6,7 @@ import pytest
 import worlds
 from numba import typeof
 
-from verlet_numba.buffers import Effects
+from verlet_numba.buffers.world import Effects
 from verlet_numba.frame import advance
 from verlet_numba.run.engine import run_chunk
 from verlet_numba.scene.build import frames

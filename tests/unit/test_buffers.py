@@ -1,4 +1,4 @@
-"""The comments behind the fields of buffers.py hold for built worlds: shape, kind and unit."""
+"""The comments behind the fields of buffers hold for built worlds: shape, kind and unit."""
 
 import ast
 import re
@@ -11,12 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verlet_numba import buffers
+from verlet_numba.buffers.arrays import NO_ROOM, gate
+from verlet_numba.kernels.narrow_beside import CHUNKS
 from verlet_numba.scene import capacity
 from verlet_numba.scene.build import frames
 from verlet_numba.scene.capacity import roomier
 from verlet_numba.study.phases import stopwatch
 
-SOURCE = Path(buffers.__file__).read_text()
+SOURCE = "".join(path.read_text() for path in sorted(Path(buffers.__file__).parent.glob("*.py")))
 COMMENT = re.compile(r"#\s+(?:\((?P<shape>[^)]*)\)\s+)?(?P<kind>real|double|int|file)\s+(?P<unit>[^;]+?)(?:;\s.+)?$")
 UNIT = re.compile(r"1|SI|1?/?\(?(?:rad|kg|m|s|N)(?:\^\d)?(?:[ /]\(?(?:rad|kg|m|s|N)(?:\^\d)?\)?)*\)?")
 EVERYWHERE = ("n", "N", "K", "L")           # symbols that mean the same in every structure
@@ -99,9 +101,12 @@ def hold(path, structure, real, file, symbols):
             assert known.setdefault(key, whole) == whole, f"{where}: {symbol} is {known[key]} elsewhere"
 
 
-def timed(model):
-    """A model's world with a stopwatch, for which no scene calls."""
-    return model.world._replace(stopwatch=stopwatch(1, 7))
+def asked_for(model):
+    """A model's world with what a command calls for and no scene: a stopwatch, and several threads."""
+    world, meet = model.world, model.world.effects.meet
+    if meet is not None:
+        meet = meet._replace(beside=capacity.beside_of(meet.narrow, CHUNKS))
+    return world._replace(effects=world.effects._replace(meet=meet), stopwatch=stopwatch(1, 7))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -109,7 +114,7 @@ def test_every_buffer_is_what_its_comment_says(name):
     model = worlds.built(SCENES[name])
     real, file = model.scene.solver.precision, model.scene.output.precision
     symbols = {"n": model.world.particles.position.shape[1], "N": model.particles}
-    for path, structure in structures(timed(model)):
+    for path, structure in structures(asked_for(model)):
         hold(path, structure, np.dtype(real), np.dtype(file), symbols)
     hold("frames", frames(model, 5), np.dtype(real), np.dtype(file), symbols)
 
@@ -129,7 +134,7 @@ def test_units_are_those_of_the_si():
 def test_scenes_have_every_structure():
     """Else the comments of the others are not looked at."""
     seen = {type(structure).__name__ for scene in SCENES.values()
-            for _, structure in structures(timed(worlds.built(scene)))} | {"Frames"}
+            for _, structure in structures(asked_for(worlds.built(scene)))} | {"Frames"}
     assert seen == set(DECLARED)
 
 
@@ -147,7 +152,7 @@ def test_only_lists_that_lack_room_grow_and_touches_with_them(short):
     effects = worlds.built(worlds.EVERYTHING).world.effects
     before = {name: of(effects)[1].size for name, of in LISTS.items()}
     for name in short:
-        LISTS[name](effects)[0][0] = buffers.NO_ROOM
+        LISTS[name](effects)[0][0] = NO_ROOM
         effects = roomier(effects)
     assert {name: of(effects)[1].size for name, of in LISTS.items()} == {
         name: size * 2**short.count(name) for name, size in before.items()}
@@ -164,18 +169,18 @@ def test_pairs_beyond_all_bounds_are_refused(monkeypatch):
     effects = worlds.built(worlds.EVERYTHING).world.effects
     monkeypatch.setattr(capacity, "MOST_PAIRS", 100)
     while effects.meet.spare.first.size <= 100 + capacity.PAIRS_A_HULL * effects.meet.still.size:
-        effects.meet.spare.listed[0] = buffers.NO_ROOM
+        effects.meet.spare.listed[0] = NO_ROOM
         effects = roomier(effects)
-    effects.meet.spare.listed[0] = buffers.NO_ROOM
+    effects.meet.spare.listed[0] = NO_ROOM
     with pytest.raises(capacity.CrowdedError, match="stand in each other"):
         roomier(effects)
 
 
 def test_gate_casts_once_and_copies_only_what_it_must():
     fine = np.zeros((3, 4))
-    assert buffers.gate(fine, np.float64) is fine
-    turned = buffers.gate(np.arange(12.0).reshape(4, 3).T, np.float32)
+    assert gate(fine, np.float64) is fine
+    turned = gate(np.arange(12.0).reshape(4, 3).T, np.float32)
     assert turned.flags.c_contiguous
     assert turned.dtype == np.float32
     assert turned.flags.writeable
-    assert buffers.gate(np.broadcast_to(1.0, 5), np.float64).flags.owndata
+    assert gate(np.broadcast_to(1.0, 5), np.float64).flags.owndata

@@ -5,7 +5,7 @@ import pytest
 import worlds
 from reference import Twin
 
-from verlet_numba import buffers as b
+from verlet_numba.buffers import world as b
 from verlet_numba.scene import colliders, meeting
 
 MEASURES = {"kinetic_energy": [b.KINETIC], "potential_energy": [b.POTENTIAL], "total_energy": [b.TOTAL],

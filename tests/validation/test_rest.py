@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import worlds
 
-from verlet_numba.buffers import PENETRATION, RESTING, SPEED_MAX
+from verlet_numba.buffers.world import PENETRATION, RESTING, SPEED_MAX
 from verlet_numba.effects.response import FEW_TOUCHES
 from verlet_numba.run.engine import State, run_substep
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 import worlds
 
-from verlet_numba.buffers import RESTING
+from verlet_numba.buffers.world import RESTING
 
 FRAMES, SPEED = 45, 2.0
 CRATE = {"kind": "box", "size": [0.3, 0.3, 0.2], "mass": 1, "friction": 0.5, "restitution": 0}

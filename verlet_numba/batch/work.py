@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from verlet_numba.run.simulate import Summary
 
 APART = "complete, but a stick ends at more than twice its length: what it belongs to has come apart"
-SIGNED = ("physics", "kernels", "effects", "scene", "run", "buffers.py", "frame.py")       # what a result comes from
+SIGNED = ("physics", "kernels", "effects", "scene", "run", "buffers", "frame.py")       # what a result comes from
 
 
 class Named(NamedTuple):

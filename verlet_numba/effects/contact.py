@@ -8,7 +8,9 @@ the push accumulated over the passes: a pass may take back what an earlier one g
 """
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import BOX, COLUMNS, MESH, NO_ROOM, PENETRATION, PLANE, SPHERE
+from verlet_numba.buffers.arrays import NO_ROOM
+from verlet_numba.buffers.contact import BOX, MESH, PLANE, SPHERE
+from verlet_numba.buffers.world import COLUMNS, PENETRATION
 from verlet_numba.physics.pose import inward, outward
 from verlet_numba.physics.solids import box, cylinder, plane, sphere
 

@@ -10,7 +10,7 @@ pass is held back short of its impact. All this comes before contacts are sought
 import math
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.effects.exact import bring, bring_corners, tell_short
 from verlet_numba.effects.hold_back import bound_gaps, hold_back
 from verlet_numba.effects.open_gaps import begin_wholes, give_of_whole, shove_whole, take_back

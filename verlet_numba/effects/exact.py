@@ -16,7 +16,7 @@ Opened by effects/open_gaps.py; what gaps do not keep apart is held back by effe
 import math
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.near_features import find_gaps, list_features
 from verlet_numba.kernels.pieces import list_pieces, update_edges, update_pieces
 

@@ -10,7 +10,7 @@ the body, or the bodies' the wrong way round, as eq. 10 is printed. What is pinn
 import math
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.buffers import FEATURE, PRINTED
+from verlet_numba.buffers.contact import FEATURE, PRINTED
 from verlet_numba.effects.touch import HULLS, grip_between
 from verlet_numba.physics.friction import held
 

@@ -9,7 +9,8 @@ its place at the start of the substep. At the sheet's border a particle may pass
 import math
 
 from verlet_numba._jit import formula, kernel
-from verlet_numba.buffers import MESH, NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
+from verlet_numba.buffers.contact import MESH
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.kernels.internal_edges import feature
 from verlet_numba.physics.closest import on_triangle

@@ -17,7 +17,7 @@ A second of 1,000 icosahedra on a floor, 480 substeps, takes 1.15 s awake and 0.
 """
 
 from verlet_numba._jit import formula, kernel
-from verlet_numba.buffers import FIXED, HUNG, RESTLESS
+from verlet_numba.buffers.contact import FIXED, HUNG, RESTLESS
 from verlet_numba.effects.contact import find_contacts
 from verlet_numba.effects.meet import distance_of
 from verlet_numba.effects.mesh_contact import find_mesh_contacts

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 
 GRIDS = 48                      # the last takes all that is smaller still
 SMALLEST = 64                   # cells of a grid; from here on no two neighbours of a cell are the same cell

@@ -15,7 +15,7 @@ one, at 1.4 to 2 times the cost.
 import math
 
 from verlet_numba._jit import formula, kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels import broad
 from verlet_numba.kernels.copying import copy, copy_points
 

@@ -27,7 +27,8 @@ Lengths are relative to the hulls, coordinates to the contact: results move and 
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NO_ROOM, POINTS
+from verlet_numba.buffers.arrays import NO_ROOM
+from verlet_numba.buffers.hulls import POINTS
 from verlet_numba.kernels.polygons import apart, arrange, far_apart, overlap, side_by_side, thin, trim
 
 NEAR = 0.01         # of a hull's reach: how near corners are to the support plane, and how near to each other to be one

@@ -9,7 +9,7 @@ A lost face and the vertex opposite to it are where the next search begins.
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.gjk import APART, MET, gjk
 from verlet_numba.kernels.hit_face import SOLID, hit_face, remember
 from verlet_numba.kernels.meeting import holds, write

@@ -5,7 +5,7 @@ the pairs: so the contacts are, bit for bit, those of one thread, for any number
 """
 
 from verlet_numba._jit import kernel, prange, threaded
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.narrow import collide_some
 
 CHUNKS = 16             # more than threads, so that none waits long for the last

@@ -7,7 +7,8 @@ their distance there: else a cloth thicker than its cells would press on itself 
 import math
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NEARER, NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
+from verlet_numba.buffers.exact import NEARER
 from verlet_numba.kernels.impact_time import NEVER, apart_at, time_of_impact
 from verlet_numba.physics.closest import of_segments, on_triangle
 

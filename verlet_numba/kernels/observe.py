@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.buffers import (
+from verlet_numba.buffers.world import (
     COLUMNS,
     CONTACTS,
     ERROR_MAX,

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import (
+from verlet_numba.buffers.world import (
     ANGULAR,
     CENTRE,
     COLUMNS,

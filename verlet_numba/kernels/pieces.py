@@ -12,7 +12,7 @@ where anything is, so that results do not depend on when a list was made.
 """
 
 from verlet_numba._jit import inlined, kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.sphere_tree import SLACK, visit_halves
 from verlet_numba.physics.flatness import unfolded
 

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import kernel
-from verlet_numba.buffers import FALLEN
+from verlet_numba.buffers.world import FALLEN
 from verlet_numba.kernels.copying import copy_points
 from verlet_numba.kernels.relax import relax_runs, relax_sticks, slack_of
 from verlet_numba.physics.distance import deviates

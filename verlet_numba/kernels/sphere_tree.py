@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from verlet_numba._jit import formula, inlined, kernel
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.physics.enclosing import sphere_of_four, sphere_of_spheres
 from verlet_numba.physics.flatness import unfolded
 

@@ -26,7 +26,8 @@ import numpy as np
 
 from verlet_numba._jit import sources
 from verlet_numba._version import __version__
-from verlet_numba.buffers import Array, World, gate
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.world import World
 
 FORMAT = b"verlet-numba checkpoint 1"
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from verlet_numba._version import __version__
-from verlet_numba.buffers import (
+from verlet_numba.buffers.arrays import Array
+from verlet_numba.buffers.world import (
     ANGULAR,
     CENTRE,
     CONTACTS,
@@ -27,7 +28,6 @@ from verlet_numba.buffers import (
     RESTING,
     SPEED_MAX,
     TOTAL,
-    Array,
 )
 from verlet_numba.run.layout import FORMAT, BodyTable, Contents, Quantity
 from verlet_numba.scene.body import Body, Integers

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from verlet_numba._jit import use_threads
-from verlet_numba.buffers import COLUMNS, FRAME, NUMBER, PENETRATION, SUBSTEP, Array, Frames, Snapshot, World
+from verlet_numba.buffers.arrays import Array
+from verlet_numba.buffers.world import COLUMNS, FRAME, NUMBER, PENETRATION, SUBSTEP, Frames, Snapshot, World
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall

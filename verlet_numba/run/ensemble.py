@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from verlet_numba.buffers import COLUMNS, FRAME, Array, Frames
+from verlet_numba.buffers.arrays import Array
+from verlet_numba.buffers.world import COLUMNS, FRAME, Frames
 from verlet_numba.frame import DIVERGED, OK
 from verlet_numba.run import checkpoint
 from verlet_numba.run.contents import contents, now

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from verlet_numba.buffers import NUMBER, World
+from verlet_numba.buffers.world import NUMBER, World
 from verlet_numba.run.contents import copy_names
 from verlet_numba.run.engine import State, run_substep, sound
 from verlet_numba.scene.body import Body

@@ -3,7 +3,8 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
-from verlet_numba.buffers import CONTACTS, ERROR_MAX, PENETRATION, RELAXATIONS, Array
+from verlet_numba.buffers.arrays import Array
+from verlet_numba.buffers.world import CONTACTS, ERROR_MAX, PENETRATION, RELAXATIONS
 from verlet_numba.run.postmortem import Divergence
 from verlet_numba.scene.schema import Scene
 

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from verlet_numba.buffers import Bending, Hinges, Joints, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.constraints import Bending, Hinges, Joints
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.numbering import Group, Numbering
 from verlet_numba.scene.runs import joined, lanes

@@ -6,22 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import (
-    COLUMNS,
-    SUBSTEP,
-    Array,
-    Collided,
-    Effects,
-    Frames,
-    Graph,
-    Observed,
-    Particles,
-    Snapshot,
-    Solver,
-    Start,
-    World,
-    gate,
-)
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.constraints import Collided, Graph, Particles, Start
+from verlet_numba.buffers.world import COLUMNS, SUBSTEP, Effects, Frames, Observed, Snapshot, Solver, World
 from verlet_numba.scene import forces
 from verlet_numba.scene.bending import bending_of
 from verlet_numba.scene.body import Body, Floats, Integers

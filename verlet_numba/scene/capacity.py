@@ -5,25 +5,12 @@ A kernel that finds a list too short writes NO_ROOM as its number; twice the roo
 
 import numpy as np
 
-from verlet_numba.buffers import (
-    NO_ROOM,
-    POINTS,
-    Array,
-    Beside,
-    Contacts,
-    Effects,
-    Exact,
-    Hulls,
-    Manifold,
-    Meet,
-    Meetings,
-    Mixed,
-    Narrow,
-    Pairs,
-    Search,
-    Spheres,
-    gate,
-)
+from verlet_numba.buffers.arrays import NO_ROOM, Array, gate
+from verlet_numba.buffers.contact import Contacts
+from verlet_numba.buffers.exact import Exact
+from verlet_numba.buffers.hulls import POINTS, Beside, Hulls, Manifold, Meet, Meetings, Mixed, Narrow, Pairs, Search
+from verlet_numba.buffers.trees import Spheres
+from verlet_numba.buffers.world import Effects
 from verlet_numba.scene.colliders import room
 from verlet_numba.scene.exact import roomier_exact
 from verlet_numba.scene.rigid import touches_of, with_room

@@ -5,20 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import (
-    BOX,
-    CYLINDER,
-    MESH,
-    PLANE,
-    SPHERE,
-    Array,
-    Carried,
-    Contacts,
-    Moving,
-    Paths,
-    Solids,
-    gate,
-)
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.contact import BOX, CYLINDER, MESH, PLANE, SPHERE, Contacts, Solids
+from verlet_numba.buffers.forces import Carried, Moving, Paths
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.clearance import Surface
 from verlet_numba.scene.numbering import Numbering, spread

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Graph, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.constraints import Graph
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.constraints import plain, weights
 from verlet_numba.scene.numbering import Numbering, padded

@@ -4,7 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Angles, Array, Runs, Softness, Sticks, gate
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.constraints import Angles, Runs, Softness, Sticks
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Group, Numbering
 from verlet_numba.scene.runs import joined, lanes, worth_runs

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import BOX, CYLINDER, SPHERE, Hulls, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import BOX, CYLINDER, SPHERE
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import Solid
 from verlet_numba.scene.hulls import Part, all_of, hulls_of, part, surface_of

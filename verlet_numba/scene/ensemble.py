@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import INSTANCES, SUMS, Array, Runs, Softness, Sticks, World, gate
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.constraints import Runs, Softness, Sticks
+from verlet_numba.buffers.world import INSTANCES, SUMS, World
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.numbering import padded
 

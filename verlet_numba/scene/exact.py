@@ -5,22 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import (
-    BOX,
-    CYLINDER,
-    NEARER,
-    NO_ROOM,
-    SPHERE,
-    Contacts,
-    Exact,
-    Friction,
-    Gaps,
-    Listing,
-    Pieces,
-    Points,
-    Wholes,
-    gate,
-)
+from verlet_numba.buffers.arrays import NO_ROOM, gate
+from verlet_numba.buffers.contact import BOX, CYLINDER, SPHERE, Contacts, Friction
+from verlet_numba.buffers.exact import NEARER, Exact, Gaps, Listing, Pieces, Points, Wholes
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid
 from verlet_numba.scene.numbering import Numbering, spread

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba import buffers
-from verlet_numba.buffers import Damping, Drag, Gravity, Wind, gate
+from verlet_numba.buffers import world
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.forces import Damping, Drag, Gravity, Wind
 from verlet_numba.scene.body import Body, Floats
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.runs import joined, lanes
@@ -23,12 +24,12 @@ def gravity(effects: Effects, inverse_mass: Floats, real: Any) -> Gravity | None
     return Gravity(lanes_of(effects.gravity, inverse_mass > 0, real))
 
 
-def others_accelerate(effects: buffers.Effects) -> bool:
+def others_accelerate(effects: world.Effects) -> bool:
     """Whether anything but gravity does."""
     return any(effect is not None for effect in (effects.wind, effects.drag, effects.damping))
 
 
-def beside_others(effects: buffers.Effects) -> Gravity | None:
+def beside_others(effects: world.Effects) -> Gravity | None:
     """Gravity as the frame loop has it: alone it is an acceleration that is set once, before the first step."""
     alone = effects.gravity is not None and not others_accelerate(effects)
     return Gravity(None) if alone else effects.gravity

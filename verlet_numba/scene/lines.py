@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import Lines, Softness, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.constraints import Lines, Softness
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.chains import Family, families, unchained
 from verlet_numba.scene.constraints import Parts, empty, per_copy, stacked

@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import Friction, Hulls, Restitution, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import Friction, Restitution
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.scene.body import Body, Floats
 from verlet_numba.scene.colliders import Solid
 from verlet_numba.scene.numbering import Numbering, spread

@@ -5,29 +5,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import (
+from verlet_numba.buffers.arrays import Array, gate
+from verlet_numba.buffers.contact import (
     BODY,
     FEATURE,
     PRINTED,
-    Array,
     Contacts,
-    Exact,
     Features,
     Friction,
-    Hulls,
-    Meet,
     Meshes,
-    Mixed,
-    Moving,
     Rest,
     Restitution,
     Rigid,
-    Spheres,
     Touches,
-    Trees,
-    Wrapped,
-    gate,
 )
+from verlet_numba.buffers.exact import Exact
+from verlet_numba.buffers.forces import Moving
+from verlet_numba.buffers.hulls import Hulls, Meet, Mixed
+from verlet_numba.buffers.trees import Spheres, Trees, Wrapped
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.capacity import manifold_of, meetings_of, narrow_of, pairs_of, search_of
 from verlet_numba.scene.colliders import FIRST_ROOM, Solid, contacts, moving, solids_of

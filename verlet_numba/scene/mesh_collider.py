@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Hulls, Meshes, Ridges, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import Meshes
+from verlet_numba.buffers.hulls import Hulls, Ridges
 from verlet_numba.scene.body import Floats, Integers
 from verlet_numba.scene.clearance import planes
 from verlet_numba.scene.colliders import Solid

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from verlet_numba.buffers import Orientation, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import Orientation
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.rigid import rigid_bodies

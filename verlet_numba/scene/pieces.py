@@ -6,7 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verlet_numba.buffers import BOX, CYLINDER, NEARER, SPHERE, Pieces, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import BOX, CYLINDER, SPHERE
+from verlet_numba.buffers.exact import NEARER, Pieces
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.chains import paths
 from verlet_numba.scene.colliders import Solid

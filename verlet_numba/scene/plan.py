@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import COLUMNS, Effects, World
+from verlet_numba.buffers.world import COLUMNS, Effects, World
 from verlet_numba.scene.body import Shape
 from verlet_numba.scene.build import Model
 from verlet_numba.scene.chains import unchained

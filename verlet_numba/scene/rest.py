@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import FIXED, HUNG, LOOSE, RESTLESS, Hulls, Rest, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import FIXED, HUNG, LOOSE, RESTLESS, Rest
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.scene.body import Body, Floats, Integers
 from verlet_numba.scene.numbering import Numbering
 from verlet_numba.scene.rigid import belongs_to, reach_of, rigid_bodies

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from verlet_numba.buffers import Rigid, Touches, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.contact import Rigid, Touches
 from verlet_numba.scene.body import Body, Integers
 from verlet_numba.scene.numbering import Numbering
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from verlet_numba.buffers import Array
+from verlet_numba.buffers.arrays import Array
 from verlet_numba.scene.body import Integers, Shape
 from verlet_numba.scene.numbering import Group
 

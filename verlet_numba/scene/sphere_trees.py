@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from verlet_numba.buffers import Candidates, Layered, Pieces, Spheres, Stack, Wrapped, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.exact import Pieces
+from verlet_numba.buffers.trees import Candidates, Layered, Spheres, Stack, Wrapped
 from verlet_numba.scene.body import Body, Floats, Integers, Shape
 from verlet_numba.scene.clearance import hull_clearance
 from verlet_numba.scene.hulls import hulls_of, surface_of

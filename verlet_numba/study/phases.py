@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 
-from verlet_numba.buffers import Stopwatch, gate
+from verlet_numba.buffers.arrays import gate
+from verlet_numba.buffers.world import Stopwatch
 from verlet_numba.kernels.stopwatch import PHASES, idle_laps
 from verlet_numba.run.engine import run_chunk, start, warm
 from verlet_numba.scene.build import Model, frames

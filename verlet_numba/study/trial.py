@@ -9,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verlet_numba.buffers import Array
+from verlet_numba.buffers.arrays import Array
 from verlet_numba.frame import OK
 from verlet_numba.run.contents import observables
 from verlet_numba.run.engine import run_chunk, start, warm

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from reference import wind_force, with_damping, with_drag
 
-from verlet_numba.buffers import Damping, Drag, Gravity, Particles, Wind
+from verlet_numba.buffers.constraints import Particles
+from verlet_numba.buffers.forces import Damping, Drag, Gravity, Wind
 from verlet_numba.effects.damping import damp
 from verlet_numba.effects.drag import resist
 from verlet_numba.effects.gravity import fall

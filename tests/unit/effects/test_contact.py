@@ -6,7 +6,8 @@ import reference
 import reference_contact
 import worlds
 
-from verlet_numba.buffers import COLUMNS, PENETRATION, Restitution
+from verlet_numba.buffers.contact import Restitution
+from verlet_numba.buffers.world import COLUMNS, PENETRATION
 from verlet_numba.effects.contact import find_contacts, penetration, separate, touching
 from verlet_numba.effects.friction import rub
 from verlet_numba.effects.restitution import bounce, foresee

@@ -6,7 +6,7 @@ import worlds
 from reference_contact import on_path
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import Carried
+from verlet_numba.buffers.forces import Carried
 from verlet_numba.effects.motion import along, carry, move
 from verlet_numba.scene.colliders import paths
 

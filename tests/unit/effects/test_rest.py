@@ -8,7 +8,7 @@ import worlds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verlet_numba.buffers import FIXED, HUNG, LOOSE, RESTLESS
+from verlet_numba.buffers.contact import FIXED, HUNG, LOOSE, RESTLESS
 from verlet_numba.effects.rest import at_rest, count_slow, depth_at_rest, hold, idle, settle, wake
 from verlet_numba.kernels.candidates import NEVER
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from verlet_numba.buffers import Candidates, Friction, Spheres
+from verlet_numba.buffers.contact import Friction
+from verlet_numba.buffers.trees import Candidates, Spheres
 from verlet_numba.effects.spheres import begin_spheres, deepest, heading, part_spheres, rub_spheres, touching_spheres
 
 N = 40

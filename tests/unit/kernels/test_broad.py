@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.broad import GRIDS, all_pairs, by_grids, lattice, sweep
 from verlet_numba.scene.capacity import search_of as search_for
 

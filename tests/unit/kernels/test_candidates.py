@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verlet_numba.buffers import POINTS, Hulls
+from verlet_numba.buffers.hulls import POINTS, Hulls
 from verlet_numba.kernels.candidates import FULL, KEPT, RENEWED, SLACK, refresh
 from verlet_numba.scene.capacity import pairs_of
 from verlet_numba.scene.capacity import search_of as search_for

@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import NO_ROOM, POINTS, Hulls, Manifold, Meetings, Pairs
+from verlet_numba.buffers.arrays import NO_ROOM
+from verlet_numba.buffers.hulls import POINTS, Hulls, Manifold, Meetings, Pairs
 from verlet_numba.kernels.manifold import FLAT, NEAR, PARALLEL, widen
 
 UP = np.array([0.0, 0.0, 1.0])

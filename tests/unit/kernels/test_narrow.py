@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.narrow import collide, gather_hulls
 from verlet_numba.kernels.narrow_beside import CHUNKS, collide_beside
 from verlet_numba.scene.capacity import beside_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verlet_numba import buffers as b
+from verlet_numba.buffers import world as b
 from verlet_numba.kernels.observe import keep, observe, record, record_velocity
 
 H = 0.02

@@ -5,7 +5,7 @@ import pytest
 from reference import relax_stick
 from stick_cases import Case, H
 
-from verlet_numba.buffers import Sticks
+from verlet_numba.buffers.constraints import Sticks
 from verlet_numba.kernels.relax import forget, relax_runs, relax_sticks
 
 PASSES = 3

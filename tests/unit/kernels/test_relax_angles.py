@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from reference import relax_angle
 
-from verlet_numba.buffers import Angles
+from verlet_numba.buffers.constraints import Angles
 from verlet_numba.kernels.relax_angles import relax_angles
 
 

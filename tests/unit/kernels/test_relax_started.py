@@ -6,7 +6,7 @@ import worlds
 from reference import relax_started_stick
 from stick_cases import Case, H
 
-from verlet_numba.buffers import FALLEN
+from verlet_numba.buffers.world import FALLEN
 from verlet_numba.kernels.relax import forget
 from verlet_numba.kernels.relax_started import CHANGE, guard, note_start, relax_started_runs, relax_started_sticks
 

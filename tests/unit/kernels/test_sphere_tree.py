@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from verlet_numba.buffers import NO_ROOM
+from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.kernels.sphere_candidates import find_spheres, outdated, travelled
 from verlet_numba.kernels.sphere_tree import expire, list_against, list_pairs, update_layered, update_wrapped
 from verlet_numba.physics.flatness import unfolded

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import worlds
 
-from verlet_numba.buffers import Runs, Sticks
+from verlet_numba.buffers.constraints import Runs, Sticks
 from verlet_numba.run.engine import start
 from verlet_numba.scene.build import build
 

@@ -8,7 +8,7 @@ import trimesh
 import worlds
 from scipy.spatial import ConvexHull
 
-from verlet_numba.buffers import Hulls
+from verlet_numba.buffers.hulls import Hulls
 from verlet_numba.scene.body import Body, Shape
 from verlet_numba.scene.colliders import solids_of
 from verlet_numba.scene.convex import CYLINDER_SIDES, LANES, hulls_of_scene, rests_on_faces

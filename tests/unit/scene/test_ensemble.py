@@ -8,7 +8,7 @@ import worlds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verlet_numba.buffers import COLUMNS, INSTANCES
+from verlet_numba.buffers.world import COLUMNS, INSTANCES
 from verlet_numba.run.engine import run_chunk, start
 from verlet_numba.scene.build import frames
 from verlet_numba.scene.ensemble import in_runs, likeness, most_beside, together
