@@ -1,7 +1,7 @@
 """Distance constraints in every form, for tests of what relaxes them."""
 
 import numpy as np
-from reference import Stick
+from reference_constraints import Stick
 
 from verlet_numba.buffers.constraints import Runs, Softness, Sticks
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference import relax_stick
+from reference_constraints import relax_stick
 from stick_cases import Case, H
 
 from verlet_numba.buffers.constraints import Sticks

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference import relax_angle
+from reference_constraints import relax_angle
 
 from verlet_numba.buffers.constraints import Angles
 from verlet_numba.kernels.relax_angles import relax_angles

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import worlds
-from reference import Stick, chains, relax_pieces
+from reference_constraints import Stick, chains, relax_pieces
 
 from verlet_numba.kernels.relax import forget
 from verlet_numba.kernels.relax_lines import relax_lines

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import worlds
-from reference import relax_started_stick
+from reference_constraints import relax_started_stick
 from stick_cases import Case, H
 
 from verlet_numba.buffers.world import FALLEN

@@ -1,118 +1,14 @@
 """Traversals list exactly the pairs that all pairs give, whatever the shapes; what saves work never changes the list."""
 
-from typing import NamedTuple
-
 import numpy as np
 import pytest
+from sphere_tree_cases import CRATE, DIE, bent, case, crumpled, expected, found, listed, sheet, turned, without_bounds
 
-from verlet_numba.buffers.arrays import NO_ROOM
-from verlet_numba.kernels.sphere_candidates import find_spheres, outdated, travelled
+from verlet_numba.kernels.sphere_candidates import find_spheres
 from verlet_numba.kernels.sphere_tree import expire, list_against, list_pairs, update_layered, update_wrapped
 from verlet_numba.physics.flatness import unfolded
 from verlet_numba.scene import shapes
-from verlet_numba.scene.body import Body
-from verlet_numba.scene.numbering import number
-from verlet_numba.scene.sphere_trees import candidates_of, layered_of, spheres_of, stack_of, wrapped_of
-
-NONE = np.zeros((0, 2), np.int64)
-DIE, CRATE = shapes.icosahedron(0.3, mass=1), shapes.box([0.3, 0.5, 0.2], mass=1)
-
-
-class Case(NamedTuple):
-    layered: object
-    wrapped: object
-    position: np.ndarray        # (3, n)
-    inverse_mass: np.ndarray
-    copies: list                # (P,) inner indices of every deformable copy
-    rigid: list                 # (shape, (P,) inner indices) of every rigid copy
-
-    @property
-    def stack(self):
-        return stack_of(self.layered, self.wrapped)
-
-
-def case(things, real=np.float64, attached=None):
-    """Things are (shape, positions (K, P, 3))."""
-    bodies = [Body("thing", shape, place, 0 * place, np.zeros(len(shape.positions), bool), (0.0, 0.0), 0.0)
-              for shape, place in things]
-    numbering = number(bodies)
-    position, inverse_mass = np.zeros((3, numbering.size), real), np.zeros(numbering.size, real)
-    for body, index in zip(bodies, numbering.bodies, strict=True):
-        position[:, index] = body.positions.transpose(2, 0, 1)
-        inverse_mass[index] = 1
-    copies = [(body.shape, own) for body, index in zip(bodies, numbering.bodies, strict=True) for own in index]
-    return Case(layered_of(bodies, numbering, numbering.size, real, NONE if attached is None else attached),
-                wrapped_of(bodies, numbering), position, inverse_mass, [own for shape, own in copies if not shape.rigid],
-                [(shape, own) for shape, own in copies if shape.rigid])
-
-
-def listed(candidates):
-    count = candidates.listed[0]
-    return list(zip(candidates.first[:count].tolist(), candidates.second[:count].tolist(), strict=True))
-
-
-def found(case, margin, itself=True, layered=None, capacity=100_000):
-    layered, candidates = layered or case.layered, candidates_of(capacity)
-    update_layered(case.position, layered)
-    assert list_pairs(layered, case.inverse_mass, margin, itself, case.stack, candidates)
-    pairs = listed(candidates)
-    assert len(set(pairs)) == len(pairs)
-    assert all(i < j for i, j in pairs)
-    return set(pairs)
-
-
-def expected(case, margin, itself=True):
-    """The naive twin: all pairs of particles."""
-    x, radius = case.position.astype(float), case.layered.radius.astype(float)
-    body = np.full(x.shape[1], -1)
-    for copy, own in enumerate(case.copies):
-        body[own] = copy
-    squared = sum((x[c][:, None] - x[c]) ** 2 for c in range(3))
-    near = squared < (radius[:, None] + radius + margin) ** 2
-    near &= (body[:, None] >= 0) & (body >= 0) & (case.inverse_mass[:, None] + case.inverse_mass > 0)
-    if not itself:
-        near &= body[:, None] != body
-    for p in range(len(radius)):
-        near[p, case.layered.partner[case.layered.apart[p]:case.layered.apart[p + 1]]] = False
-    return {(int(i), int(j)) for i, j in np.argwhere(np.triu(near, 1))}
-
-
-def without_bounds(layered):
-    return layered._replace(row=np.full_like(layered.row, -1), node=layered.node[:0])
-
-
-def turned(points, rng):
-    return points @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
-
-
-def sheet(nx, ny, thickness, diagonals="both", size=(1, 1)):
-    return shapes.cloth(size, [nx, ny], diagonals=diagonals, mass=1, thickness=thickness)
-
-
-def bent(shape, angle, lengthwise=1.0):
-    """A cloth along a curve whose slope is angle(u), u in 0..1 along i: as long as at rest, times a factor along i."""
-    nx, ny = shape.layout[1:]
-    u = (np.arange(nx) / (nx - 1)).repeat(ny)
-    grid = angle(np.arange(nx) / (nx - 1))
-    step = np.linalg.norm(shape.positions[ny] - shape.positions[0]) * lengthwise
-    along = np.cumsum(np.concatenate([[0], step * np.cos(grid[1:])]))
-    up = np.cumsum(np.concatenate([[0], step * np.sin(grid[1:])]))
-    row = np.rint(u * (nx - 1)).astype(int)
-    return np.stack([along[row], shape.positions[:, 1], up[row]], axis=1)
-
-
-def crumpled(shape, rng, rounds, squeeze=1.0):
-    """A cloth creased along random lines, each side turned about it; then squeezed."""
-    points = shape.positions.copy()
-    for _ in range(rounds):
-        origin, axis = points[rng.integers(len(points))], rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        side = np.cross(axis, rng.normal(size=3))
-        beyond = (points - origin) @ side > 0
-        angle, arms = rng.uniform(-np.pi, np.pi), points[beyond] - origin
-        points[beyond] = origin + (arms * np.cos(angle) + np.cross(axis, arms) * np.sin(angle)
-                                   + np.outer(arms @ axis, axis) * (1 - np.cos(angle)))
-    return points * squeeze + rng.normal(size=points.shape) * rng.choice([0, 0.002, 0.02])
+from verlet_numba.scene.sphere_trees import candidates_of
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -402,50 +298,3 @@ def test_nothing_is_nothing():
     assert list_pairs(None, None, 0.0, True, None, None)
     assert list_against(None, None, None, 0.0, None, None)
     assert find_spheres(None, None, None, True, None, None)
-
-
-def twin_outdated(position, at, soft, margin):
-    moved = (position - at)[:, soft > 0].T.astype(float)
-    return 2 * np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() > margin
-
-
-def test_lists_outlive_common_motion_and_no_other():
-    rng = np.random.default_rng(0)
-    for _ in range(300):
-        soft = (rng.uniform(size=40) < 0.7).astype(float)
-        soft[0] = 1
-        at = rng.normal(size=(3, 40))
-        position = at + (rng.normal(size=(3, 1)) + rng.normal(size=(3, 40)) * 0.01) * soft + (1 - soft) * rng.normal()
-        margin = 10.0 ** rng.uniform(-2, -1)
-        assert bool(outdated(position, at, soft, margin)) is bool(twin_outdated(position, at, soft, margin))
-        assert travelled(position, at) == pytest.approx(np.linalg.norm(position - at, axis=0).max())
-
-
-def test_no_contact_is_missed_while_a_list_lives():
-    """Two cloths and a rope drift, waver and fall: every substep, all that touch are among the candidates."""
-    rng = np.random.default_rng(3)
-    cloth, rope = sheet(8, 8, 0.05), shapes.rope([0, 0, 0], [1, 0, 0.1], 15, mass=1, thickness=0.05)
-    this = case([(cloth, cloth.positions + np.array([[[0, 0, 0]], [[0.1, 0.05, 0.06]]])), (rope, rope.positions[None])])
-    spheres = spheres_of(this.layered, 0.03, 20_000)
-    renewals = 0
-    speed = np.zeros_like(this.position)
-    for step in range(300):
-        speed += rng.normal(size=speed.shape) * 2e-4 * (spheres.soft > 0)
-        this.position[:] += speed + np.array([[0.1], [0], [-0.01 * step]])
-        before = spheres.at.copy()
-        assert find_spheres(this.position, this.inverse_mass, this.layered, True, this.stack, spheres)
-        renewals += (spheres.at != before).any()
-        assert expected(this, 0.0) <= set(listed(spheres.candidates))
-    assert 3 < renewals < 150
-
-
-def test_a_list_that_had_no_room_is_made_again():
-    shape = shapes.particles(np.random.default_rng(1).uniform(size=(60, 3)), [1], radius=0.05)
-    this = case([(shape, shape.positions[None])])
-    small = spheres_of(this.layered, 0.1, 4)
-    assert not find_spheres(this.position, this.inverse_mass, this.layered, True, this.stack, small)
-    assert small.candidates.listed[0] == NO_ROOM
-    large = spheres_of(this.layered, 0.1, 4000)._replace(at=small.at)
-    large.candidates.listed[0] = small.candidates.listed[0]
-    assert find_spheres(this.position, this.inverse_mass, this.layered, True, this.stack, large)
-    assert set(listed(large.candidates)) == expected(this, 0.1)

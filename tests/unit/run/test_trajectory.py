@@ -12,13 +12,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
-from verlet_numba.run.compression import encode, round_mantissa
 from verlet_numba.run.layout import chunk_shape
-from verlet_numba.run.ordered_file import OrderedFile
 from verlet_numba.run.trajectory import BodyTable, Contents, Quantity, TrajectoryFile
 
 FRAMES = 150
@@ -383,41 +378,3 @@ def test_float64_is_kept_on_request(tmp_path):
     path = write(tmp_path / "double.vtkhdf", dtype="f8")
     with h5py.File(path) as file:
         np.testing.assert_array_equal(file["VTKHDF/Points"], frames(0, FRAMES)[2]["position"].reshape(-1, 3))
-
-
-normal = st.floats(2.0**-100, 2.0**100, width=32) | st.floats(-(2.0**100), -(2.0**-100), width=32) | st.just(0.0)
-
-
-@given(arrays(np.float32, 20, elements=normal), st.integers(1, 24))
-def test_rounding_is_bounded_idempotent_and_leaves_the_last_bits_zero(values, bits):
-    rounded = round_mantissa(values.copy(), bits)
-    assert (np.abs(rounded.astype(float) - values) <= 2.0**-bits * np.abs(values.astype(float))).all()
-    assert (rounded.view(np.uint32) & ((1 << (24 - bits)) - 1) == 0).all()
-    np.testing.assert_array_equal(round_mantissa(rounded.copy(), bits), rounded)
-
-
-@given(arrays(np.float32, (5, 7, 3), elements=normal))
-def test_hdf5_decodes_an_encoded_chunk(values):
-    with h5py.File("memory", "w", driver="core", backing_store=False) as file:
-        dataset = file.create_dataset("x", values.shape, "f4", chunks=values.shape, compression="gzip", shuffle=True)
-        dataset.id.write_direct_chunk((0, 0, 0), encode(values))
-        np.testing.assert_array_equal(dataset[()], values)
-
-
-@given(st.lists(st.tuples(st.integers(0, 60), st.binary(min_size=1, max_size=30)), max_size=12), st.integers(0, 12))
-def test_an_ordered_file_reads_as_written_and_is_whole_on_the_disk_after_flush(tmp_path_factory, writes, flush_after):
-    path = tmp_path_factory.mktemp("ordered") / "file"
-    file, expected = OrderedFile(path, create=True), bytearray()
-    for number, (start, data) in enumerate(writes):
-        expected.extend(bytes(max(0, start + len(data) - len(expected))))
-        expected[start:start + len(data)] = data
-        file.seek(start)
-        file.write(memoryview(data))
-        file.seek(0)
-        assert file.read() == expected
-        if number == flush_after:
-            file.flush()
-            assert path.read_bytes() == expected
-    file.flush()
-    assert path.read_bytes() == expected
-    file.close()

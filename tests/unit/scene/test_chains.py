@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference import chains
+from reference_constraints import chains
 
 from verlet_numba.scene import shapes
 from verlet_numba.scene.chains import families, paths, slots_along, unchained
