@@ -23,6 +23,8 @@ from verlet_numba.study.view import fill, view
 
 WORDS = arrays(np.uint16, array_shapes(min_dims=2, max_dims=2, max_side=9).map(lambda shape: (*shape, 3)))
 
+NODE = pytest.mark.skipif(not shutil.which("node"), reason="runs the page's own scripts, which needs node on PATH")
+
 
 def whole(planes):
     """Words (F, N, 3) from planes (2, F, 3, N): `wholeSteps` of page/decode.js, by running sums modulo 2^16."""
@@ -109,8 +111,6 @@ unpack(fs.readFileSync("data.txt", "utf8"), header.arrays).then((arrays) => {
 @pytest.fixture(scope="module")
 def scripted(trajectory, tmp_path_factory):
     """A page, and what its own scripts make of it in node."""
-    if not shutil.which("node"):
-        pytest.skip("needs node")
     folder = tmp_path_factory.mktemp("node")
     view(trajectory, folder / "a.html")
     page = (folder / "a.html").read_text(encoding="utf-8")
@@ -123,6 +123,7 @@ def scripted(trajectory, tmp_path_factory):
     return page, {name: np.array(values) for name, values in json.loads(told).items()}
 
 
+@NODE
 def test_the_pages_script_decodes_the_same(scripted):
     page, told = scripted
     _, found = unpacked(page)
@@ -130,6 +131,7 @@ def test_the_pages_script_decodes_the_same(scripted):
     np.testing.assert_array_equal(told["triangles"], found["triangles"].ravel())
 
 
+@NODE
 def test_the_pages_script_moves_bodies_as_the_trajectory_does(scripted, trajectory):
     """A quarter of the way from frame 10 to 11: positions, normals of the sheet, strain, the pose of a spinning box."""
     _, told = scripted
@@ -153,6 +155,7 @@ def test_the_pages_script_moves_bodies_as_the_trajectory_does(scripted, trajecto
         [np.cos(angle), -np.sin(angle), 0, 1], [np.sin(angle), np.cos(angle), 0, 1], [0, 0, 1, 0.2], [0, 0, 0, 1]], atol=1e-4)
 
 
+@NODE
 def test_a_cylinder_is_round_along_its_side_and_sharp_at_its_rims(scripted):
     _, told = scripted
     places, across = told["places"].reshape(-1, 3), told["across"].reshape(-1, 3)
@@ -164,7 +167,7 @@ def test_a_cylinder_is_round_along_its_side_and_sharp_at_its_rims(scripted):
     assert (across[lids] * places[lids]).sum(axis=1).min() > 0
 
 
-@pytest.mark.skipif(not shutil.which("node"), reason="needs node")
+@NODE
 def test_the_pages_script_is_one_that_parses(trajectory, tmp_path):
     view(trajectory, tmp_path / "a.html")
     script = re.findall(r"<script>(.*?)</script>", (tmp_path / "a.html").read_text(encoding="utf-8"), re.DOTALL)[-1]
