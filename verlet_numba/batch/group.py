@@ -11,10 +11,10 @@ from pathlib import Path
 
 from verlet_numba.run.engine import start, warm
 from verlet_numba.run.ensemble import Instance, blocks, model_alone, model_of, simulate_block
-from verlet_numba.run.resume import ResumeError
+from verlet_numba.run.resume import ResumeError, find
 from verlet_numba.run.signals import StopSignals
 from verlet_numba.run.simulate import Summary, simulate
-from verlet_numba.run.summary import STOPPED
+from verlet_numba.run.summary import BROKEN, COMPLETE, STOPPED
 from verlet_numba.run.trajectory import DifferenceError
 from verlet_numba.scene.load import Loaded
 from verlet_numba.scene.place import place
@@ -75,15 +75,27 @@ def together(block: list[Instance]) -> list[Summary | Exception]:
 
 
 def alone(instance: Instance) -> Summary | Exception:
-    """Simulate a run by itself, from where a worker before left it if there is such a place."""
+    """Simulate a run by itself, from where a worker before left it if there is such a place.
+
+    A trajectory that is whole but has no result is made anew: who knows which program it is of.
+    """
     ready, output, command = instance.prepared, instance.output, instance.command
+    begun = unfinished(output)
     try:
         try:
-            return simulate(ready, output, command=command, resume=True, threads=1, quiet=True)
+            return simulate(ready, output, command=command, overwrite=not begun, resume=begun, threads=1, quiet=True)
         except (ResumeError, DifferenceError):          # the program has changed since
             return simulate(ready, output, command=command, overwrite=True, threads=1, quiet=True)
     except Exception as error:
         return error
+
+
+def unfinished(output: Path) -> bool:
+    """Whether a worker before has begun this trajectory and not ended it."""
+    try:
+        return output.exists() and find(output).status not in (COMPLETE, BROKEN)
+    except ResumeError:
+        return False
 
 
 def prepared(loaded: Loaded) -> Prepared:

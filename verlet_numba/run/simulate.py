@@ -3,6 +3,7 @@
 import glob
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,14 +50,13 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     """
     clock = time.perf_counter()
     total = frame_count(prepared.scene) if count is None else count + 1
+    if (over := at_its_end(prepared, output, total, resume)) is not None:       # nothing is written: perhaps nothing may be
+        return over
     with Lock(output), StopSignals() as signals, Progress(total, prepared.scene.solver.substeps, quiet) as progress:
         remove_leftovers(output)
+        if (over := at_its_end(prepared, output, total, resume)) is not None:   # whoever had the lock has ended it
+            return over
         found = find(output) if resume and output.exists() else None
-        if found is not None:
-            hold_against(output, found, prepared.scene, total)
-            if found.status in (COMPLETE, BROKEN):
-                checkpoint.remove(output)
-                return ended(output, found, prepared.scene)
         run = Run(prepared, output, total, threads, progress, found,
                   lambda: signals.stop() or (max_time is not None and time.perf_counter() - clock > max_time))
         try:
@@ -69,6 +69,19 @@ def simulate(prepared: Prepared, output: Path, *, count: int | None = None, comm
     if run.summary.status == STOPPED:
         run.summary.signal = signals.number
     return run.summary
+
+
+def at_its_end(prepared: Prepared, output: Path, total: int, resume: bool) -> Summary | None:
+    """The summary of a run to be resumed that has ended already; None if there is something to do. Raises ResumeError."""
+    if not (resume and output.exists()):
+        return None
+    found = find(output)
+    hold_against(output, found, prepared.scene, total)
+    if found.status not in (COMPLETE, BROKEN):
+        return None
+    with suppress(OSError):
+        checkpoint.remove(output)
+    return ended(output, found, prepared.scene)
 
 
 def remove_leftovers(output: Path) -> None:
