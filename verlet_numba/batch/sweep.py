@@ -1,7 +1,6 @@
 """A sweep from its plan to its table: what is missing is run, on this machine or on a cluster, and what is there is kept."""
 
 import contextlib
-import fcntl
 import json
 import os
 import time
@@ -12,6 +11,7 @@ from typing import Any
 
 from verlet_numba.batch.planning import Plan, Run
 from verlet_numba.batch.progress import Progress
+from verlet_numba.run.lock import BusyError, Lock
 from verlet_numba.run.signals import StopSignals
 from verlet_numba.study import sweep_folder as disk
 from verlet_numba.study.sweep_folder import COMPLETE, FAILED, KILLED, LASTING, PLAN, Result, SweepError
@@ -202,13 +202,10 @@ def ids(document: disk.Plan) -> list[str]:
 
 @contextlib.contextmanager
 def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
-    """Nobody else runs this shard meanwhile. The lock is the system's: it ends with the process that holds it."""
-    path = folder / f".lock-{shard[0]}-of-{shard[1]}"
-    with path.open("w") as file:
+    """Nobody else runs this shard meanwhile. Raises SweepError if somebody does."""
+    with contextlib.ExitStack() as stack:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            stack.enter_context(Lock(folder / f"shard-{shard[0]}-of-{shard[1]}"))
+        except BusyError:
             raise SweepError(f"{folder}: another process runs this sweep or shard; wait for it, or stop it") from None
-        except OSError:
-            pass        # a disk without locks
         yield

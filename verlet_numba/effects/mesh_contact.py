@@ -8,12 +8,12 @@ its place at the start of the substep. At the sheet's border a particle may pass
 
 import math
 
-from verlet_numba._jit import formula, kernel
+from verlet_numba._jit import kernel
 from verlet_numba.buffers.arrays import NO_ROOM
 from verlet_numba.buffers.contact import MESH
 from verlet_numba.effects.contact import pose_of
 from verlet_numba.kernels.internal_edges import feature
-from verlet_numba.physics.closest import on_triangle
+from verlet_numba.physics.closest import length, on_triangle
 from verlet_numba.physics.pose import inward, outward
 
 ON = 1e-9               # of the mesh's reach: a point as near to the surface takes its normal from the feature
@@ -65,11 +65,6 @@ def list_of_mesh(position, previous, inverse_mass, contact, meshes, s):
         c += 1
     contact.listed[0] = c
     return True
-
-
-@formula
-def length(x, y, z):
-    return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel

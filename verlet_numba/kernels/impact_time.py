@@ -9,8 +9,8 @@ solved: parallel edges, triangles without area and points that move in a plane n
 
 import math
 
-from verlet_numba._jit import formula, kernel
-from verlet_numba.physics.closest import of_segments, on_triangle
+from verlet_numba._jit import kernel
+from verlet_numba.physics.closest import length, of_segments, on_triangle
 
 PART = 0.9              # of the free time that is gone at once
 LEFT = 0.1              # of the reach, or of the first distance if that is less: nearer than that is touching
@@ -18,11 +18,6 @@ HAIR = 1e-6             # of the first distance: the same where there is no reac
 ROUNDS = 256            # of measuring: then it is said to touch where it has got to
 ROUNDING = 1e-14        # of the coordinates: how much a distance may be off
 NEVER = 2.0             # a time after the step's end
-
-
-@formula
-def length(x, y, z):
-    return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel

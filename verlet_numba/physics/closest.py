@@ -7,13 +7,15 @@ constant: any scale will do, and corners may coincide or lie on a line. Distance
 its square root where the distance hardly depends on them.
 """
 
+import math
+
 from verlet_numba._jit import formula
-from verlet_numba.physics.rigid import cross
+from verlet_numba.physics.simplex import cross, dot
 
 
 @formula
-def dot(ax, ay, az, bx, by, bz):
-    return ax * bx + ay * by + az * bz
+def length(x, y, z):
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @formula

@@ -19,11 +19,11 @@ NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 class BusyError(Exception):
-    """Another process writes this trajectory."""
+    """Another process writes this file."""
 
 
 class Lock:
-    """A context manager within which nobody else writes the trajectory at `path`.
+    """A context manager within which nobody else writes what stands at `path`.
 
     Raises BusyError, which names the holder, if somebody does; OSError if the folder cannot be written to.
     """
