@@ -277,14 +277,14 @@ class TrajectoryFile:
         return block[len(known):]
 
     def _read(self, first: int, last: int) -> _Block:
-        """Frames of the file."""
+        """Frames of the file. Only before anything is written: HDF5 2.0 forgets that a chunk made longer directly is uncompressed."""
         part = slice(first, last)
         return _Block({path: self._file[path][part] for path in self._rows},
                       {name: self._file[f"particles/trajectory/{name}/value"][part] for name in self._fields})
 
     def _write_rest(self) -> None:
         self._disk.check()
-        if len(self._rest):
+        if self._stored + len(self._rest) > self.frames:
             self._raw = True
             self._store(self._rest)
 

@@ -8,6 +8,7 @@ import sys
 import textwrap
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -209,6 +210,28 @@ def test_a_resumed_file_has_the_datasets_of_an_undisturbed_one(file, tmp_path, s
         assert committed(path) >= stop
         writer.finish("complete", "2024-01-01T00:00:00+00:00", {})
     assert_same(datasets(file), datasets(path))
+
+
+@pytest.mark.parametrize(("counted", "written", "resume_at"), [(70, 70, 40), (21, 23, 11), (43, 70, 14), (102, 132, 52)])
+def test_flushes_while_frames_are_simulated_again_harm_nothing(file, tmp_path, counted, written, resume_at):
+    """Also where the one before died with its frames on the disk and not yet counted."""
+    path = tmp_path / "run.vtkhdf"
+    if os.fork() == 0:
+        writer = TrajectoryFile(path, contents(), FRAMES, beside=False)
+        writer.append(*frames(0, counted))
+        writer.flush()
+        writer._count = SimpleNamespace(write=lambda count: os._exit(0))
+        writer.append(*frames(counted, written + 1))
+        writer.flush()
+        os._exit(1)
+    assert os.wait()[1] == 0
+    with TrajectoryFile(path, contents(), FRAMES, resume_at=resume_at) as writer:
+        assert writer.frames == counted
+        for first in range(resume_at, FRAMES, 9):
+            writer.append(*frames(first, min(first + 9, FRAMES)))
+            writer.flush()
+        writer.finish("complete", "2024-01-01T00:00:00+00:00", {"relax": 1.5})
+    assert_same(datasets(path), datasets(file))
 
 
 def test_resuming_beyond_the_last_frame_is_refused(tmp_path):
