@@ -1,15 +1,9 @@
 """What tests share: the fixture `simulate`, a scene's run in memory."""
 
-import os
-from pathlib import Path
-
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):         # processes that fill one empty cache have crashed each other
-    home = Path(os.environ.get("NUMBA_CACHE_DIR") or Path.home() / ".cache")
-    os.environ["NUMBA_CACHE_DIR"] = str(home / f"verlet-numba-tests-{worker}")
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np

@@ -12,24 +12,28 @@ So the cache folder is named after everything that the machine code depends on: 
 call, Numba, NumPy and the processor. An edit anywhere among them gives a new folder.
 """
 
+import contextlib
+import fcntl
 import hashlib
 import os
 import platform
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
 import numpy as np
+from numba.core import caching
 
 from verlet_numba._version import digest
 
 config: Any = numba.config
 types: Any = numba.types
 prange: Any = numba.prange
+FunctionCache: Any = caching.FunctionCache
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,
@@ -72,6 +76,40 @@ if not CACHE.exists():
     _prune(CACHE.parent, CACHE)
 
 
+class SharedCache(FunctionCache):  # type: ignore[misc]  # its class has no types
+    """Numba's cache of a function, for several processes at once.
+
+    Its index and its machine code are separate files. Two processes that fill them at the same time give one name to the code
+    of two signatures, and who has read the index before loads the wrong one. One lock of the folder makes each access whole;
+    it ends with the process that holds it.
+    """
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        with locked(fcntl.LOCK_SH):
+            return super().load_overload(signature, context)
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        with locked(fcntl.LOCK_EX):
+            super().save_overload(signature, data)
+
+
+@contextlib.contextmanager
+def locked(kind: int) -> Iterator[None]:
+    """Share the folder of machine code with readers (LOCK_SH) or have it alone (LOCK_EX); not where nothing can be locked."""
+    try:
+        CACHE.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(CACHE / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:                 # a folder that others filled: it is read only
+        yield
+        return
+    try:
+        with contextlib.suppress(OSError):
+            fcntl.flock(descriptor, kind)
+        yield
+    finally:
+        os.close(descriptor)
+
+
 clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.CPointer(types.int64)))
 """POSIX: the seconds and nanoseconds of a clock, into the array whose `.ctypes` is the second argument."""
 
@@ -111,10 +149,12 @@ def _cached(function: Function, **options: Any) -> Function:
     """Numba reads its cache folder from its configuration while decorating, so that is where it is set."""
     before = config.CACHE_DIR
     config.CACHE_DIR = str(CACHE)
+    compiled = numba.njit(**FLAGS, **options)(function)
     try:
-        return numba.njit(cache=True, **FLAGS, **options)(function)  # type: ignore[no-any-return]  # Numba has no types
+        compiled._cache = SharedCache(function)
     finally:
         config.CACHE_DIR = before
+    return compiled  # type: ignore[no-any-return]  # Numba has no types
 
 
 def formula(function: Function) -> Function:

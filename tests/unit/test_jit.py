@@ -1,5 +1,6 @@
 """Machine code on disk: an edited callee in another file is never served stale, and nothing else is compiled twice."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -8,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from verlet_numba import _jit
 
@@ -96,3 +98,32 @@ def test_only_one_file_names_numba():
     naming = {path.name for path in PACKAGE.rglob("*.py")
               if re.search(r"^\s*(?:import|from)\s+numba\b|\bn?jit\(|@\w*jit\b|(?<!_)numba\.\w", path.read_text(), re.MULTILINE)}
     assert naming == {"_jit.py"}
+
+
+def plus_one(x):
+    return x + 1
+
+
+def test_an_index_and_its_machine_code_are_read_and_written_under_one_lock(tmp_path, monkeypatch):
+    """Else processes that fill one empty cache load the code of each other's signatures."""
+    seen = []
+
+    def watched(name, forbidden):
+        original = getattr(IndexDataCacheFile, name)
+
+        def access(self, *arguments):
+            with (tmp_path / "lock").open() as other, pytest.raises(BlockingIOError):
+                fcntl.flock(other, forbidden | fcntl.LOCK_NB)
+            seen.append(name)
+            return original(self, *arguments)
+
+        monkeypatch.setattr(IndexDataCacheFile, name, access)
+
+    monkeypatch.setattr(_jit, "CACHE", tmp_path)
+    watched("load", fcntl.LOCK_EX)
+    watched("save", fcntl.LOCK_SH)
+    assert _jit.kernel(plus_one)(1) == 2
+    assert _jit.kernel(plus_one)(1) == 2
+    assert seen == ["load", "save", "load"]
+    with (tmp_path / "lock").open() as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)

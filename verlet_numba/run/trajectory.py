@@ -277,7 +277,7 @@ class TrajectoryFile:
         return block[len(known):]
 
     def _read(self, first: int, last: int) -> _Block:
-        """Frames of the file. Only before anything is written: HDF5 2.0 forgets that a chunk made longer directly is uncompressed."""
+        """Frames of the file. Before anything is stored: HDF5 2.0 misreads a chunk that was made longer directly."""
         part = slice(first, last)
         return _Block({path: self._file[path][part] for path in self._rows},
                       {name: self._file[f"particles/trajectory/{name}/value"][part] for name in self._fields})
