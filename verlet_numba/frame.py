@@ -116,8 +116,8 @@ def advance(world, frames, budget):
                     drop(stopwatch)
                     return FULL
                 move_hulls(hulls, contact, moving)
-                gather(position, hulls)
-                gather(position, points)
+                gather(position, hulls, meet)
+                gather(position, points, mixed)
                 clock[STAGE] = ARRESTED
             while True:                                                     # once, and again where resting bodies wake
                 if not (find_at_colliders(position, previous, inverse_mass, contact, meshes, rest)      # (P11 to P17)
@@ -129,8 +129,8 @@ def advance(world, frames, budget):
                 if not wake(position, acceleration, inverse_mass, clock[NUMBER], h, rest, contact, hulls, meet, points, mixed,
                             moving):
                     break
-                gather(position, hulls)
-                gather(position, points)
+                gather(position, hulls, meet)
+                gather(position, points, mixed)
             lap(stopwatch, FINDING)
             note_start(position, start)
             foresee(position, acceleration, contact, restitution, h)

@@ -156,7 +156,7 @@ def test_effects_set_to_nothing_change_nothing(without):
                                   colliders=[*scene["colliders"], moving, mesh], output={"fields": ["velocity"]})
     model = worlds.started(crowded)
     absent = [name for name, effect in model.world.effects._asdict().items() if effect is None]
-    assert absent == ["features"]
+    assert absent == ["features", "exact", "rapid", "bending"]
     found = worlds.advanced(model, 10)[0][:, :-3]
     rigid = np.concatenate([np.full(body.positions[..., 0].size, body.shape.rigid) for body in model.bodies[:-1]])
     np.testing.assert_array_equal(found[:, ~rigid], expected[:, ~rigid])

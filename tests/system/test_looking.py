@@ -17,7 +17,7 @@ def test_view_tells_what_it_left_out(verlet, trajectory, tmp_path):
     assert whole.stderr == ""
     assert whole.stdout.startswith(f"{tmp_path / 'a.html'}: 31 frames, 0.")
     thin = verlet("view", trajectory, "-o", tmp_path / "b.html", "--budget", "0.003")
-    assert "31 frames are more than 0.003 MB of positions, so every 3. is shown" in thin.stderr
+    assert "31 frames are more than 0.003 MB of positions, so one in 3 is shown" in thin.stderr
     assert ": 11 frames, " in thin.stdout
     assert (tmp_path / "b.html").stat().st_size < (tmp_path / "a.html").stat().st_size
     quiet = verlet("view", trajectory, "-o", tmp_path / "c.html", "--budget", "0.003", "-q")
@@ -35,7 +35,7 @@ def test_export_tells_what_it_wrote(verlet, trajectory, tmp_path):
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (["view", "RUN", "-o", "x.pdf"], 2, "cannot write .pdf; use .html"),
-    (["view", "none.vtkhdf", "-o", "x.html"], 1, "no such file"),
+    (["view", "none.vtkhdf", "-o", "x.html"], 2, "'none.vtkhdf' does not exist"),
     (["view", "RUN", "-o", "x.html", "--frames", "99"], 2, "there is no frame 99"),
     (["view", "RUN", "-o", "there.html"], 2, "exists"),
     (["export", "RUN", "-o", "x.fbx"], 2, "cannot write .fbx; use .usdc"),
@@ -43,11 +43,12 @@ def test_export_tells_what_it_wrote(verlet, trajectory, tmp_path):
     (["export", "RUN", "-o", "none/x.obj"], 2, "none is no folder"),
     (["export", "RUN", "-o", "x.pc2", "--frames", "0,1,5"], 2, "PC2"),
     (["render", "RUN", "-o", "x.avi"], 2, "cannot write .avi; use .png, .gif, .mp4")])
-def test_what_cannot_be_done_is_told_in_one_line(verlet, trajectory, tmp_path, arguments, code, words):
+def test_what_cannot_be_done_is_told(verlet, trajectory, tmp_path, arguments, code, words):
     (tmp_path / "there.html").write_text("mine", encoding="utf-8")
     told = verlet(*[str(trajectory) if word == "RUN" else word for word in arguments], cwd=tmp_path, code=code)
     assert words in told.stderr
-    assert (len(told.stderr.splitlines()), told.stdout) == (1, "")
+    assert told.stderr.count("\n") == 1 or told.stderr.startswith("Usage: ")
+    assert told.stdout == ""
     assert [file.name for file in tmp_path.iterdir()] == ["there.html"]
     assert (tmp_path / "there.html").read_text(encoding="utf-8") == "mine"
 

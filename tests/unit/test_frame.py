@@ -42,7 +42,7 @@ def test_frames_of_whole_chains_are_those_of_the_twin():
 def test_the_scene_of_the_twin_calls_for_everything(twin):
     """Else the test above could not fail."""
     effects = worlds.built(worlds.APART).world.effects._asdict()
-    assert [name for name, effect in effects.items() if effect is None] == ["features", "orientation"]
+    assert [name for name, effect in effects.items() if effect is None] == ["features", "exact", "rapid", "orientation", "bending"]
     assert twin[2]["contacts"].sum() >= 25
     assert twin[2]["penetration_max"].max() > 1e-4
 

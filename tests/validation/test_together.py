@@ -50,7 +50,8 @@ def seen(tmp_path_factory):
         bodies=[*worlds.EVERYTHING["bodies"], *SLIDING, *RESTING_ONES, FALLING, *TIED],
         attachments=[*worlds.EVERYTHING["attachments"], ["thick", 0, "held", int(corner)]])
     model = worlds.started(scene)
-    assert [name for name, effect in model.world.effects._asdict().items() if effect is None] == ["features"]
+    assert [name for name, effect in model.world.effects._asdict().items() if effect is None] == [
+        "features", "exact", "rapid", "bending"]
     position, _, measures = worlds.advanced(model, FRAMES)
     cuts = np.cumsum([body.copies * len(body.shape.positions) for body in model.bodies])[:-1]
     return {body.name: part for body, part in zip(model.bodies, np.split(position, cuts, axis=1), strict=True)}, measures

@@ -143,6 +143,7 @@ class Meet(NamedTuple):
     still: Array                # (H,) int 1; 1: nothing moves the hull
     pairs: Pairs
     spare: Pairs
+    met: Array                  # (1,) int 1; how many meetings there are of the pairs as hulls now stand, -1: they have not met yet
     search: Search
     narrow: Narrow
     beside: Beside | None       # None: one thread
@@ -164,6 +165,7 @@ class Mixed(NamedTuple):
     begin: Array                # (H + 1,) int 1; scratch: candidates of each hull
     pairs: Pairs
     spare: Pairs
+    met: Array                  # (1,) int 1; as in Meet
     meetings: Meetings
     narrow: Narrow
     margin: float               # double m; how near a particle must come to be listed

@@ -65,8 +65,8 @@ def strike_bodies(position, inverse_mass, acceleration, contact, meet, hulls, mi
                    + line[t, 2] * (line[t, 11] + uz + vz))
         answer[t, 4] = max(0.0, leaving) if answer[t, 8] > 0.0 else 0.0
     displace(position, inverse_mass, rigid)
-    gather(position, hulls)
-    gather(position, points)
+    gather(position, hulls, None)
+    gather(position, points, None)
 
 
 @inlined

@@ -12,11 +12,20 @@ from verlet_numba.physics.pose import outward
 
 
 @kernel
-def gather(position, hulls):
-    """Bring the corners of all hulls to where their particles are."""
+def gather(position, hulls, meet):
+    """Bring the corners of all hulls to where their particles are; how they met before is no longer true."""
     if hulls is None:
         return
     gather_hulls(position, hulls)
+    part(meet)
+
+
+@kernel
+def part(meet):
+    """The pairs of hulls have not met yet."""
+    if meet is None:
+        return
+    meet.met[0] = -1
 
 
 @kernel
@@ -45,15 +54,21 @@ def move_hulls(hulls, contact, moving):
 
 @kernel
 def find_meetings(hulls, meet, rest):
-    """List the contacts of hulls. False: more than there is room for (grow and call again)."""
+    """List the contacts of hulls. False: more than there is room for (grow and call again).
+
+    Pairs learn by meeting, so they meet once as the hulls stand, however often this is called.
+    """
     if meet is None:
         return True
     horizon, margin = meet.horizon, meet.margin
     if refresh(hulls, meet.still, meet.pairs, meet.spare, meet.search, margin, horizon, meet.all_pairs) == FULL:
         return False
-    if not collide_awake(hulls, meet, meet.beside, rest):
-        return False
-    straighten(hulls, meet.pairs, meet.meetings, meet.ridges)
+    if meet.met[0] < 0:
+        if not collide_awake(hulls, meet, meet.beside, rest):
+            return False
+        straighten(hulls, meet.pairs, meet.meetings, meet.ridges)
+        meet.met[0] = meet.meetings.listed[0]
+    meet.meetings.listed[0] = meet.met[0]
     return several(hulls, meet.pairs, meet.meetings, meet.manifold)
 
 

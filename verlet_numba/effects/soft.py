@@ -36,7 +36,11 @@ def find_mixed(position, hulls, trees, mixed):
         carry(hulls.centre, mixed.pairs, mixed.spare, mixed.pairs.listed[0], candidates.listed[0])
         replace(mixed.pairs, mixed.spare, candidates.listed[0])
         copy_points(position, mixed.at)
-    return collide(hulls, mixed.pairs, mixed.meetings, mixed.narrow, mixed.near, mixed.coherent)
+    if mixed.met[0] < 0:
+        if not collide(hulls, mixed.pairs, mixed.meetings, mixed.narrow, mixed.near, mixed.coherent):
+            return False
+        mixed.met[0] = mixed.meetings.listed[0]
+    return True
 
 
 @kernel

@@ -152,25 +152,25 @@ def collide(hulls, pairs, meetings, narrow, margin, coherent, quiet=None):
     """Contacts of all pairs whose gap is at most `margin` [m], one a pair, in the order of the pairs.
 
     coherent: None: every pair is met for the first time, and learns nothing. quiet (H,): two hulls that both are do not meet;
-    None: none is. False is returned where there are more meetings than there is room for: grow and call again.
+    None: none is. There must be room for as many meetings as there are pairs, or False is returned before any have met: pairs
+    learn by meeting, and what they find when they meet again may differ in rounding.
     """
+    if pairs.listed[0] > meetings.gap.size:
+        meetings.listed[0] = NO_ROOM
+        return False
     meetings.listed[0] = collide_some(
         hulls.corner, hulls.centre, hulls.reach, hulls.rounding, hulls.start, hulls.size, hulls.graph, hulls.neighbours,
         hulls.neighbour, narrow.seen, narrow.vertex, narrow.label, narrow.weight, narrow.corner, narrow.across, narrow.plane,
         narrow.visible, narrow.horizon, narrow.stack, pairs.first, pairs.second, pairs.axis, pairs.face, meetings.pair,
-        meetings.corner, meetings.weight, meetings.normal, meetings.gap, margin, coherent, quiet, 0, pairs.listed[0], 0,
-        meetings.gap.size)
-    return meetings.listed[0] != NO_ROOM
+        meetings.corner, meetings.weight, meetings.normal, meetings.gap, margin, coherent, quiet, 0, pairs.listed[0], 0)
+    return True
 
 
 @kernel
 def collide_some(points, centre, reach, rounding, start, size, graph, neighbours, neighbour, seen, vertex, label, weight, corner,
                  across, plane, visible, horizon, stack, first, second, axis, face, pair, columns, shares, normal, gap, margin,
-                 coherent, quiet, begin, end, listed, room):
-    """Write the contacts of the pairs from `begin` to `end` as meetings number `listed` up to `room`.
-
-    Returns the number after the last, or NO_ROOM.
-    """
+                 coherent, quiet, begin, end, listed):
+    """Write the contacts of the pairs from `begin` to `end` as meetings from number `listed` on; returns the next number."""
     for i in range(begin, end):
         g, h = first[i], second[i]
         if quiet is not None and quiet[g] and quiet[h]:
@@ -224,8 +224,6 @@ def collide_some(points, centre, reach, rounding, start, size, graph, neighbours
                 learn(axis, face, i, solid, sa, sb, a, b, c, d, e, f, nx, ny, nz)
         if -distance > bound:
             continue
-        if listed == room:
-            return NO_ROOM
         pair[listed] = i
         write(points, columns, shares, normal, gap, listed, a, b, c, d, e, f, u, v, w, -nx, -ny, -nz, -distance - both)
         listed += 1

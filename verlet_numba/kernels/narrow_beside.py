@@ -46,7 +46,7 @@ def collide_chunks(points, centre, reach, rounding, start, size, graph, neighbou
         found[chunk] = collide_some(
             points, centre, reach, rounding, start, size, graph, neighbours, neighbour, seen[chunk], vertex[chunk], label[chunk],
             weight[chunk], corner[chunk], across[chunk], plane[chunk], visible[chunk], horizon[chunk], stack[chunk], first, second,
-            axis, face, pair, columns, shares, normal, gap, margin, 1, quiet, begin, end, begin, end)
+            axis, face, pair, columns, shares, normal, gap, margin, 1, quiet, begin, end, begin)
 
 
 @kernel

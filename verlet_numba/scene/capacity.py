@@ -3,6 +3,8 @@
 A kernel that finds a list too short writes NO_ROOM as its number; twice the room is made for that list alone.
 """
 
+from typing import TypeVar
+
 import numpy as np
 
 from verlet_numba.buffers.arrays import NO_ROOM, Array, gate
@@ -21,6 +23,7 @@ GRIDS, CELLS = 48, 64       # of the search for pairs: grids, and the fewest cel
 POINTS_A_PAIR = 64          # of a manifold in the making
 MOST_PAIRS = 1 << 16        # that are listed at most, and as many more for each hull, for each particle of deformable bodies:
 PAIRS_A_HULL, PAIRS_A_PARTICLE = 16, 256
+Listed = TypeVar("Listed", Pairs, Meetings)
 
 
 class CrowdedError(Exception):
@@ -117,12 +120,13 @@ def _roomier_meet(meet: Meet | None) -> Meet | None:
         return None
     if _lacks_room(meet.spare.listed):
         capacity = _twice(meet.spare.first.size, meet.still.size, PAIRS_A_HULL, "bodies and colliders")
-        meet = meet._replace(pairs=copied(meet.pairs, capacity), spare=pairs_of(capacity),
+        meet = meet._replace(pairs=copied(meet.pairs, pairs_of(capacity)), spare=pairs_of(capacity),
                              search=meet.search._replace(code=whole(capacity)))
     if _lacks_room(meet.meetings.listed):
         capacity = 2 * meet.meetings.pair.size
         manifold = None if meet.manifold is None else manifold_of(meet.manifold.near.size, capacity)
-        meet = meet._replace(meetings=meetings_of(capacity), manifold=manifold)
+        meet.meetings.listed[0] = 0
+        meet = meet._replace(meetings=copied(meet.meetings, meetings_of(capacity)), manifold=manifold)
     return meet
 
 
@@ -138,7 +142,8 @@ def _roomier_mixed(mixed: Mixed | None) -> Mixed | None:
         return None
     if _lacks_room(mixed.candidates.listed):
         capacity = _twice(mixed.candidates.first.size, mixed.hull.size, PAIRS_A_PARTICLE, "particles")
-        mixed = mixed._replace(candidates=candidates_of(capacity), pairs=copied(mixed.pairs, capacity), spare=pairs_of(capacity))
+        mixed = mixed._replace(candidates=candidates_of(capacity), pairs=copied(mixed.pairs, pairs_of(capacity)),
+                               spare=pairs_of(capacity))
     if _lacks_room(mixed.meetings.listed):
         mixed = mixed._replace(meetings=meetings_of(2 * mixed.meetings.pair.size))
     return mixed
@@ -155,10 +160,8 @@ def _roomier_exact(exact: Exact | None) -> Exact | None:
     return roomier_exact(exact)
 
 
-def copied(pairs: Pairs, capacity: int) -> Pairs:
-    """Pairs with room for more."""
-    larger = pairs_of(capacity)
-    larger.listed[:] = pairs.listed
-    for old, new in zip(pairs[1:], larger[1:], strict=True):
+def copied(smaller: Listed, larger: Listed) -> Listed:
+    """The larger list, with what stands in the smaller one."""
+    for old, new in zip(smaller, larger, strict=True):
         new[tuple(map(slice, old.shape))] = old
     return larger

@@ -142,7 +142,8 @@ def soft_meeting(scene: Scene, bodies: list[Body], numbering: Numbering, togethe
     hull[particles] = count + np.arange(len(particles))
     mixed = Mixed(candidates_of(FIRST_ROOM), gate(np.zeros((3, size)), real), gate(hull, np.int64),
                   gate(np.zeros(count + 1), np.int64),
-                  pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), meetings_of(FIRST_ROOM), narrow_of(points),
+                  pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), gate(np.zeros(1), np.int64), meetings_of(FIRST_ROOM),
+                  narrow_of(points),
                   LISTING_MARGIN * spacing_of(bodies), near, 1)
     return trees, spheres, points, mixed
 
@@ -185,7 +186,8 @@ def meet_of(scene: Scene, found: list[Solid], hulls: Hulls, still: Array) -> Mee
     reach = hulls.reach[hulls.body >= 0]
     as_whole = scene.solver.response == "body"
     manifold = manifold_of(int(hulls.size.max()), FIRST_ROOM) if as_whole and rests_on_faces(hulls) else None
-    return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), search_of(len(hulls.body), FIRST_ROOM),
+    return Meet(gate(still, np.int64), pairs_of(FIRST_ROOM), pairs_of(FIRST_ROOM), gate(np.zeros(1), np.int64),
+                search_of(len(hulls.body), FIRST_ROOM),
                 narrow_of(hulls), None, manifold, meetings_of(FIRST_ROOM), MEETING_MARGIN * float(reach.min()) if as_whole else 0.0,
                 min(scene.solver.substeps, LASTING) if scene.solver.substeps > 1 else 0, 1,
                 1 if scene.solver.broad_phase == "all_pairs" else None,

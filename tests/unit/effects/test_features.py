@@ -28,7 +28,7 @@ class Case:
         self.x, self.previous, self.w, _ = world.particles
         self.indices = [index[0] for index in self.model.numbering.bodies]
         e = self.effects = world.effects
-        gather(self.x, e.hulls)
+        gather(self.x, e.hulls, e.meet)
         assert find_meetings(e.hulls, e.meet, e.rest)
         assert e.meet.meetings.listed[0] == 1
         self.before = self.x.copy()

@@ -36,7 +36,7 @@ class Case:
     def found(self, number=5):
         """Touches are found, weighed and aimed."""
         e = self.effects
-        gather(self.x, e.hulls)
+        gather(self.x, e.hulls, e.meet)
         assert find_meetings(e.hulls, e.meet, e.rest)
         begin_touches(e.rigid, e.touches)
         touch_colliders(e.contact, e.friction, e.restitution, e.rigid, e.touches)
