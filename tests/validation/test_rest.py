@@ -8,6 +8,8 @@ from verlet_numba.buffers.world import PENETRATION, RESTING, SPEED_MAX
 from verlet_numba.effects.response import FEW_TOUCHES
 from verlet_numba.run.engine import State, run_substep
 
+pytestmark = pytest.mark.validate        # what rests compiles for minutes
+
 FLOOR = {"kind": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
 CRATE = {"kind": "box", "size": [0.4, 0.4, 0.4], "mass": 1}
 STACK = [CRATE | {"name": f"crate{k}", "position": [0, 0, 0.2 + 0.4 * k]} for k in range(3)]

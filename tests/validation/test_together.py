@@ -7,6 +7,8 @@ import worlds
 
 from verlet_numba.buffers.world import RESTING
 
+pytestmark = pytest.mark.validate        # what rests compiles for minutes
+
 FRAMES, SPEED = 45, 2.0
 CRATE = {"kind": "box", "size": [0.3, 0.3, 0.2], "mass": 1, "friction": 0.5, "restitution": 0}
 DIE = {"kind": "icosahedron", "radius": 0.1, "mass": 1, "friction": 0.5, "restitution": 0}

@@ -76,7 +76,7 @@ class Case:
                 yield from ((*a[1:], *b[1:], edges) for a, b, edges in pairs)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.validate] * (name == "colliders")) for name in SCENES])
 def test_every_pair_that_could_touch_is_found(name):
     """What the trees find is what all pairs give, and closest points are those of physics/closest.py."""
     case = Case(name).find()

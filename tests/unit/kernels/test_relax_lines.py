@@ -73,7 +73,7 @@ def jittered(model, share):
 
 
 @pytest.mark.parametrize(("tolerance", "square_root", "soft"), WAYS)
-@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.validate)])
 def test_chains_are_the_twins(precision, tolerance, square_root, soft):
     model = worlds.built(scene(precision, square_root, tolerance, soft))
     start = jittered(model, 0.02)

@@ -17,7 +17,7 @@ WAYS = [(None, None, False, False), (None, None, False, True), (0.1, None, False
 
 
 @pytest.mark.parametrize(("tolerance", "approximate", "soft", "some"), WAYS)
-@pytest.mark.parametrize("real", [np.float64, np.float32])
+@pytest.mark.parametrize("real", [np.float64, pytest.param(np.float32, marks=pytest.mark.validate)])
 def test_runs_are_the_twins_and_sticks_are_runs(real, tolerance, approximate, soft, some):
     """some: a third of the particles take the present direction of the sticks that they are the first of."""
     case, rng = Case(real, soft), np.random.default_rng(2)

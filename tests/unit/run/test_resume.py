@@ -128,6 +128,7 @@ def test_a_scene_without_bodies_and_observables_goes_on(scene, pieces, tmp_path)
     assert_same(tmp_path / "a.vtkhdf", tmp_path / "b.vtkhdf")
 
 
+@pytest.mark.validate
 def test_buffers_that_have_grown_are_kept_as_they_are(tmp_path):
     from verlet_numba.run.engine import grown
 
