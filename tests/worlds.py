@@ -13,7 +13,7 @@ from verlet_numba.scene.place import place
 
 APART = {
     "time": {"duration": 1, "frame_rate": 60},
-    "solver": {"substeps": 4, "iterations": 2},
+    "solver": {"substeps": 4, "iterations": 2, "orientation_guard": True},
     "effects": {"gravity": [0.5, 0, -9.81], "drag": {"linear": 0.3, "quadratic": 0.2}, "damping": 0.4,
                 "wind": {"velocity": [2, 1, 0.5], "density": 1.2}, "friction": {"static": 0.5, "dynamic": 0.3},
                 "restitution": 0.1, "self_collision": True, "rest": {"time": 10}},
@@ -44,7 +44,7 @@ APART = {
 Its bodies meet colliders, rigid ones the room alone, and each other only later. Nothing reaches the mesh, nor rests so long.
 """
 
-EVERYTHING = APART | {"solver": {**APART["solver"], "orientation_guard": True}, "bodies": [
+EVERYTHING = APART | {"bodies": [
     *APART["bodies"],
     {"kind": "icosahedron", "name": "die", "radius": 0.1, "mass": 0.5, "position": [0.65, 0.1, 0.33], "velocity": [1.5, 0, -2]},
     {"kind": "box", "name": "block", "size": [0.2, 0.2, 0.2], "mass": 1, "position": [-0.5, -0.6, 0.302], "velocity": [0, 0, -1],

@@ -20,13 +20,14 @@ import platform
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
 import llvmlite.binding as llvm
 import numba
 import numpy as np
-from numba.core import caching
+from numba.core import caching, registry
 
 from verlet_numba._version import digest
 
@@ -34,6 +35,7 @@ config: Any = numba.config
 types: Any = numba.types
 prange: Any = numba.prange
 FunctionCache: Any = caching.FunctionCache
+Dispatcher: Any = registry.CPUDispatcher
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False, "boundscheck": False, "no_cfunc_wrapper": True,
@@ -114,9 +116,32 @@ clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32,
 """POSIX: the seconds and nanoseconds of a clock, into the array whose `.ctypes` is the second argument."""
 
 
-def kernel(function: Function) -> Function:
-    """Compile `function` on first call: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
-    return _cached(function)
+class Kernel(Dispatcher):  # type: ignore[misc]  # as above
+    """A function that other compiled ones call. To unpack a call from Python is as much code as many a kernel itself: it is left
+    out, and who calls it from Python nevertheless gets the same function compiled with it.
+    """
+
+    def add_overload(self, result: Any) -> None:
+        self.overloads[tuple(result.signature.args)] = result
+
+    def _compile_for_args(self, *arguments: Any, **named: Any) -> Any:
+        return self.from_python
+
+    @cached_property
+    def from_python(self) -> Any:
+        return compiled(self.py_func, CACHE / "from_python", **self.options)
+
+
+def kernel(function: Function, **options: Any) -> Function:
+    """Compile `function` for other kernels: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
+    bare = compiled(function, CACHE, no_cpython_wrapper=True, **options)
+    bare.__class__, bare.options = Kernel, options
+    return bare  # type: ignore[no-any-return]  # as above
+
+
+def entry(function: Function) -> Function:
+    """Compile a kernel that the program calls from Python."""
+    return compiled(function, CACHE)  # type: ignore[no-any-return]  # as above
 
 
 def inlined(function: Function) -> Function:
@@ -124,12 +149,12 @@ def inlined(function: Function) -> Function:
 
     It must not test an argument for None: that branch is pruned in functions of their own only.
     """
-    return _cached(function, inline="always")
+    return kernel(function, inline="always")
 
 
 def threaded(function: Function) -> Function:
     """Compile a function of which `prange` loops run on several threads, as many as `numba.set_num_threads` says."""
-    return _cached(function, parallel=True)
+    return kernel(function, parallel=True)
 
 
 def use_threads(count: int) -> None:
@@ -137,26 +162,27 @@ def use_threads(count: int) -> None:
     numba.set_num_threads(min(count, config.NUMBA_NUM_THREADS))
 
 
+def formula(function: Function) -> Function:
+    """Compile a scalar formula that kernels inline; it needs no disk cache of its own."""
+    return kernel(function, cached=False)
+
+
 def scan(function: Function) -> Function:
     """Compile a search for the greatest of finite numbers: it is exact in any order, so lanes of a vector may share it.
 
     The only licence is that no operand is a NaN and that zeros have no sign; sums are not reordered.
     """
-    return numba.njit(**(FLAGS | {"fastmath": {"nnan", "nsz"}}))(function)  # type: ignore[no-any-return]  # as above
+    return kernel(function, cached=False, fastmath={"nnan", "nsz"})
 
 
-def _cached(function: Function, **options: Any) -> Function:
+def compiled(function: Function, folder: Path, cached: bool = True, **options: Any) -> Any:
     """Numba reads its cache folder from its configuration while decorating, so that is where it is set."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(CACHE)
-    compiled = numba.njit(**FLAGS, **options)(function)
+    config.CACHE_DIR = str(folder)
+    dispatcher = numba.njit(**FLAGS | options)(function)
     try:
-        compiled._cache = SharedCache(function)
+        if cached:
+            dispatcher._cache = SharedCache(function)
     finally:
         config.CACHE_DIR = before
-    return compiled  # type: ignore[no-any-return]  # Numba has no types
-
-
-def formula(function: Function) -> Function:
-    """Compile a scalar formula that kernels inline; it needs no disk cache of its own."""
-    return numba.njit(**FLAGS)(function)  # type: ignore[no-any-return]  # likewise
+    return dispatcher

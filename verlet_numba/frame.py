@@ -5,7 +5,7 @@ once; the compiler drops the branch, so the effect is no part of the machine cod
 the loop.
 """
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import entry
 from verlet_numba.buffers.world import ARRESTED, FRAME, INTEGRATED, NUMBER, PENETRATION, RELAXED, RESTING, STAGE, SUBSTEP, WHOLE
 from verlet_numba.effects.aim import aim_colliders, aim_hulls, respond
 from verlet_numba.effects.bending import unbend
@@ -62,7 +62,7 @@ from verlet_numba.kernels.stopwatch import (
 OK, DIVERGED, FULL, PAUSED = 0, 1, 2, 3
 
 
-@kernel
+@entry
 def advance(world, frames, budget):
     """A chunk of frames. A frame is kept at its time and finished one substep later, so that its velocity is central.
 

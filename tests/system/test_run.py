@@ -141,7 +141,7 @@ def test_provenance_is_enough_to_repeat_the_run(found, mixed):
     assert text["scene_text"].decode() == mixed.scene.read_text(encoding="utf-8")
     scene = json.loads(text["scene"])
     assert scene["effects"]["gravity"] == [0, 0, -9.81]
-    assert scene["colliders"][0]["kind"] == "plane"
+    assert scene["effects"]["contact"] == "none"
     assert scene["bodies"][2]["radius"] == 0.1
     assert text["command"].decode() == f"verlet-numba run {mixed.scene}"
     assert {"verlet-numba", "numba", "numpy", "h5py"} <= json.loads(text["versions"]).keys()

@@ -9,8 +9,8 @@ from verlet_numba.scene.prepare import prepare
 
 SCENES = Path(__file__).parents[2] / "scenes"
 FILES = sorted(path.relative_to(SCENES) for path in SCENES.rglob("*.yaml") if path.parent.name not in ("hard", "sweeps"))
-LONG = {"bowl", "bouncing_icosahedron", "bungee", "cloth_on_spinning_ball", "covered_crates", "curtain", "rope_net",
-        "sliding_boxes", "springboard"}     # effects that nothing else needs compiled: minutes
+LONG = {"bowl", "bouncing_icosahedron", "bungee", "cloth_on_spinning_ball", "covered_crates", "curtain", "icosahedra_room",
+        "rope_net", "sliding_boxes", "springboard"}     # effects that nothing else needs compiled: minutes
 KNOWN = ("not simulated yet",)      # bodies pass through each other: the scenes say so themselves
 
 

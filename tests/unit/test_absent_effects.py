@@ -22,7 +22,7 @@ OCCURS = {
     "near_features.find_gaps": {"exact"}, "continuous.find_impacts": {"rapid"}, "rest.count_slow": {"rest"},
     "orientation.volume": {"orientation"}, "hinge.gradients": {"bending"}, "stopwatch.reading": {"stopwatch"}}
 """Functions that are compiled if any of these is there."""
-LONG = ("exact", "paper")
+LONG = ("exact", "paper", "colliders at rest", "a crate on the floor")
 EFFECTS = set(Effects._fields)
 CALM = dict.fromkeys(("drag", "damping", "wind", "friction", "restitution", "rest"))
 STILL = [{key: value for key, value in collider.items() if key not in ("path", "spin", "friction", "restitution")}

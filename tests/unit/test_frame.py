@@ -17,17 +17,17 @@ MEASURES = {"kinetic_energy": [b.KINETIC], "potential_energy": [b.POTENTIAL], "t
 
 @pytest.fixture(scope="module")
 def twin():
-    """18 frames with every effect, in which bodies meet colliders and not each other."""
-    return Twin(*worlds.placed(worlds.APART)).frames(18)
+    """12 frames with every effect, in which bodies meet colliders and not each other."""
+    return Twin(*worlds.placed(worlds.APART)).frames(12)
 
 
 def test_every_frame_is_that_of_the_twin(twin):
-    positions, velocities, measures = worlds.advanced(worlds.started(worlds.APART), 18)
+    positions, velocities, measures = worlds.advanced(worlds.started(worlds.APART), 12)
     np.testing.assert_allclose(positions[:12], twin[0][:12], atol=1e-10)
     np.testing.assert_allclose(positions, twin[0], atol=1e-7)       # what tumbles and bounces magnifies rounding
     np.testing.assert_allclose(velocities, twin[1], atol=1e-5)
     for name, columns in MEASURES.items():
-        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(18, -1), rtol=1e-5, atol=1e-5, err_msg=name)
+        np.testing.assert_allclose(measures[:, columns], twin[2][name].reshape(12, -1), rtol=1e-5, atol=1e-5, err_msg=name)
 
 
 def test_frames_of_whole_chains_are_those_of_the_twin():
@@ -42,7 +42,7 @@ def test_frames_of_whole_chains_are_those_of_the_twin():
 def test_the_scene_of_the_twin_calls_for_everything(twin):
     """Else the test above could not fail."""
     effects = worlds.built(worlds.APART).world.effects._asdict()
-    assert [name for name, effect in effects.items() if effect is None] == ["features", "exact", "rapid", "orientation", "bending"]
+    assert [name for name, effect in effects.items() if effect is None] == ["features", "exact", "rapid", "bending"]
     assert twin[2]["contacts"].sum() >= 25
     assert twin[2]["penetration_max"].max() > 1e-4
 

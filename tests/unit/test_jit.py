@@ -18,7 +18,7 @@ CALLEE = "from verlet_numba._jit import kernel\n\n\n@kernel\ndef double(x):\n   
 CALLER = ("from verlet_numba._jit import kernel\nfrom verlet_numba.kernels.callee import double\n\n\n"
           "@kernel\ndef twice_and_one(x):\n    return double(x) + 1.0\n")
 RUN = ("from verlet_numba.kernels.caller import twice_and_one as f\n"
-       "print(f(3.0), sum(f.stats.cache_hits.values()), sum(f.stats.cache_misses.values()))")
+       "print(f(3.0), sum(f.from_python.stats.cache_hits.values()), sum(f.from_python.stats.cache_misses.values()))")
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_old_folders_go_and_what_is_not_ours_stays(tmp_path):
 
 def test_kernels_stand_where_the_fingerprint_looks():
     compiled = [path for path in PACKAGE.rglob("*.py")
-                if re.search(r"_jit import .*\b(kernel|formula|inlined|scan)\b", path.read_text())]
+                if re.search(r"_jit import .*\b(kernel|entry|formula|inlined|scan)\b", path.read_text())]
     assert len(compiled) > 40
     assert {path.relative_to(PACKAGE).parts[0] for path in compiled} <= set(_jit.COMPILED)
 

@@ -231,6 +231,7 @@ def outside(run, side):
     return max(np.abs(x[..., :2]).max() - side / 2, -x[..., 2].min(), x[..., 2].max() - side)
 
 
+@pytest.mark.validate
 def test_runs_repeat_and_all_pairs_are_the_pairs_of_the_grids(simulate):
     side, data = room(20, 2)
     run, again = simulate(data), simulate(data)

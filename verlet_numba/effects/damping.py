@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import entry
 from verlet_numba.physics.resistance import damped
 
 
-@kernel
+@entry
 def damp(position, previous, acceleration, h, damping):
     """Add damping to what accelerates the particles so far. Rows are sliced first, so that the loop vectorises."""
     if damping is None:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import entry, kernel
 from verlet_numba.physics.resistance import drag as resisted
 
 
-@kernel
+@entry
 def resist(position, previous, acceleration, h, drag):
     """Add drag to what accelerates the particles so far. Rows are sliced first, so that the loop vectorises."""
     if drag is None:

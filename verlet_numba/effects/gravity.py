@@ -1,9 +1,9 @@
 """Gravity: a constant acceleration. It is the first of the effects that accelerate, so it also starts their sum at zero."""
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import entry, kernel
 
 
-@kernel
+@entry
 def fall(acceleration, gravity):
     """Set every particle's acceleration to gravity, or to zero for the effects that follow."""
     if acceleration is None:

@@ -1,12 +1,12 @@
 """Wind on the triangles of all bodies, each corner taking a third of the force."""
 
-from verlet_numba._jit import kernel
+from verlet_numba._jit import entry
 from verlet_numba.physics.wind import pressure
 
 VALENCE = 6.0       # triangles about a corner: as many accelerate it together
 
 
-@kernel
+@entry
 def blow(position, previous, acceleration, h, wind):
     """Add the wind's force to what accelerates the particles so far; a triangle's velocity is the mean of its corners'.
 

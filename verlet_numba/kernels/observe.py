@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from verlet_numba._jit import inlined, kernel
+from verlet_numba._jit import entry, inlined, kernel
 from verlet_numba.buffers.world import (
     COLUMNS,
     CONTACTS,
@@ -49,7 +49,7 @@ def record(output, values, order, instances):
             row += 1
 
 
-@kernel
+@entry
 def record_velocity(output, f, position, before, order, instances, h):
     """Central differences about the frame's time: second order in the step. Only where the file asks for velocities."""
     if output is None:
@@ -63,7 +63,7 @@ def record_velocity(output, f, position, before, order, instances, h):
             row += 1
 
 
-@kernel
+@entry
 def observe(measures, sound, position, snapshot, observed, h):
     """Energies, momenta and constraint errors of the kept frame, in double precision, one instance after the other.
 

@@ -4,7 +4,7 @@ Nobody who does not ask for it pays for it: without a stopwatch the calls are no
 one of so many substeps is timed.
 """
 
-from verlet_numba._jit import clock_gettime, kernel
+from verlet_numba._jit import clock_gettime, entry, kernel
 
 PHASES = ("rest", "gravity", "wind", "drag", "damping", "integration", "paths", "finding contacts", "weighing contacts",
           "answering contacts", "relaxation", "rebound and friction", "frames")
@@ -51,7 +51,7 @@ def drop(stopwatch):
     stopwatch.running[0] = 0
 
 
-@kernel
+@entry
 def idle_laps(stopwatch, count):
     """So many laps in which nothing happens: what they show is the clock's own time."""
     begin(stopwatch, 0)

@@ -43,5 +43,5 @@ def test_deviation_is_relative_and_on_both_sides():
 def test_single_precision_is_not_widened(formula):
     assert isinstance(formula(np.float32(2), np.float32(1)), (np.float32, float))
     formula(np.float32(2), np.float32(1))
-    float32 = next(signature for signature in formula.nopython_signatures if "float32" in str(signature.args))
+    float32 = next(signature for signature in formula.from_python.nopython_signatures if "float32" in str(signature.args))
     assert str(float32.return_type) == "float32"

@@ -30,7 +30,7 @@ def test_triangle_without_area_feels_nothing():
 
 def test_single_precision_is_not_widened():
     pressure(*[np.float32(1)] * 11)
-    signature = next(s for s in pressure.nopython_signatures if "float32" in str(s.args))
+    signature = next(s for s in pressure.from_python.nopython_signatures if "float32" in str(s.args))
     assert "float32" in str(signature.return_type)
 
 
