@@ -134,6 +134,8 @@ class Kernel(Dispatcher):  # type: ignore[misc]  # as above
 
 def kernel(function: Function, **options: Any) -> Function:
     """Compile `function` for other kernels: no GIL, strict arithmetic, machine code kept on disk under the fingerprint."""
+    if config.DISABLE_JIT:
+        return function
     bare = compiled(function, CACHE, no_cpython_wrapper=True, **options)
     bare.__class__, bare.options = Kernel, options
     return bare  # type: ignore[no-any-return]  # as above
