@@ -134,8 +134,10 @@ class Run:
             0, CHECKPOINTS * checkpoint.size(self.model.world) - checkpoint.there(self.output))
 
     def tell_where(self) -> None:
-        if self.summary.resumed_at:
-            self.progress.tell(f"{self.output}: goes on with frame {self.summary.frames} of {self.total}")
+        if self.found is not None and self.summary.resumed_at:
+            more = self.found.frames - self.summary.frames
+            again = f", that of its last checkpoint; {more} more that are there are simulated again" if more else ""
+            self.progress.tell(f"{self.output}: goes on with frame {self.summary.frames} of {self.total}{again}")
         elif self.found is not None:
             self.progress.tell(f"{self.output}: no checkpoint can be used; simulated again from frame 0 on, and held against the "
                                f"{self.found.frames} frames that are there")

@@ -122,7 +122,7 @@ def cell(values: Array | None, kind: str) -> str:
     if kind == "rest_time":
         told = f"{values[0]:.5g}" if np.isfinite(values[0]) else "never"
         return f"{told:>{WIDTH}}" + " " * (2 * WIDTH)
-    return "".join(f"{value:{WIDTH}.5g}" for value in (values[-1], values.min(), values.max()))
+    return "".join(f"{value + 0.0:{WIDTH}.5g}" for value in (values[-1], values.min(), values.max()))     # -0 is 0
 
 
 def write_csv(analyses: Sequence[Analysis], path: Path) -> None:
